@@ -39,9 +39,9 @@ verify:
 .verify-laws .verify-parts .verify-runs: .verify-%: $(STAMP)
 	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
 
-# Packages that results are compared with. None of their dependencies is installed beside those named here, because the
+# Packages that results are compared with, such as Adhesion by one file. None of their dependencies is installed beside those named here, because the
 # comparisons need no others.
-PEERS = 'Adhesion>=0.93' 'gstools>=1.7' gstools-cython hankel emcee pyevtk meshio 'stochastic-arrow>=1.1' six
+PEERS = 'Adhesion>=0.93' 'tamaas>=2.9' 'gstools>=1.7' gstools-cython hankel emcee pyevtk meshio 'stochastic-arrow>=1.1' six
 .verify-laws .verify-runs: $(VENV)/.peers
 $(VENV)/.peers: $(STAMP) Makefile
 	PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python --no-deps $(PEERS) || \

@@ -52,7 +52,10 @@ class ElasticSolid(Protocol):
 
     @property
     def inverse_thickness(self) -> float:
-        """1/h of a layer [1/m], 0 of a half-space: the third number of a solid in compiled loops."""
+        """1/h of a layer [1/m], 0 of a half-space: the third number of a solid in compiled loops.
+
+        It is ``equilibrium.CIRCLE`` of a half-space under the profile of a circle.
+        """
 
     @property
     def softness(self) -> Softness:
@@ -78,6 +81,14 @@ class ElasticSolid(Protocol):
         Its slope over the indentation is the load. That over the area is the energy release rate, because a contact
         that shrinks releases what it stores.
         """
+
+    def heights(
+        self, r: Array, radius: float, indentation: float, sphere_radius: float
+    ) -> tuple[Array, Array]:
+        """Return the heights of a half-space and of the sphere at distances from the axis of a contact [m]."""
+        shape = r, radius, indentation, sphere_radius
+        surface = -halfspace.normal_displacement(*shape)
+        return surface, surface + halfspace.gap(*shape)
 
     def normal_stiffness(self, radius: float) -> float:
         """Return the change of the load with the indentation of a contact of fixed radius [N/m]."""
@@ -261,8 +272,76 @@ class HalfSpace(ElasticSolid):
         return float(self.softness.energy(stress))
 
 
+class _Searched(ElasticSolid):
+    """Solid whose contacts have no closed form: a search of ``sim.laws.equilibrium`` finds them."""
+
+    thickness: float
+
+    def radius(self, mount: Mount, work: ArrayLike, sphere_radius: float) -> Array:
+        numbers = *mount, work, sphere_radius, self.contact_modulus, self.thickness
+        return np.asarray(equilibrium.radius_on_layer(*numbers))
+
+    def load(self, radius: ArrayLike, mount: Mount, sphere_radius: float) -> Array:
+        numbers = *mount, sphere_radius, self.contact_modulus, self.thickness
+        return np.asarray(equilibrium.load_on_layer(radius, *numbers))
+
+    def indentation(
+        self, radius: ArrayLike, mount: Mount, sphere_radius: float
+    ) -> Array:
+        numbers = *mount, sphere_radius, self.contact_modulus, self.thickness
+        return np.asarray(equilibrium.indentation_on_layer(radius, *numbers))
+
+    def contact_energy(
+        self, radius: ArrayLike, indentation: ArrayLike, sphere_radius: float
+    ) -> Array:
+        numbers = sphere_radius, self.contact_modulus, self.thickness
+        return np.asarray(equilibrium.energy_on_layer(radius, indentation, *numbers))
+
+    def pull_off_load(self, work: float, sphere_radius: float) -> float:
+        numbers = sphere_radius, self.contact_modulus, self.thickness
+        return float(equilibrium.pull_off_load_on_layer(work, *numbers))
+
+
 @dataclass(frozen=True)
-class Layer(ElasticSolid):
+class UnderCircle(_Searched, HalfSpace):
+    """Elastic half-space under a rigid sphere that is no parabola. Limit: half-space, for contacts much smaller.
+
+    Examples
+    --------
+    A sphere needs a larger load than a parabola for a contact of 0.4 of its radius:
+
+    >>> mounts = (0.0, 0.16, math.inf), (0.0, 0.4 * math.atanh(0.4), math.inf)
+    >>> solids = HalfSpace(1.0), UnderCircle(1.0)
+    >>> print(*(f"{solid.load(0.4, mount, 1.0):.4f}" for solid, mount in zip(solids, mounts)))
+    0.3413 0.3658
+    """
+
+    thickness: float = equilibrium.CIRCLE
+
+    @property
+    def inverse_thickness(self) -> float:
+        return equilibrium.CIRCLE
+
+    def heights(
+        self, r: Array, radius: float, indentation: float, sphere_radius: float
+    ) -> tuple[Array, Array]:
+        """``u_z = (2/π) ∫ (δ - s artanh(s/R))/√(r² - s²) ds`` over s from 0 to r or a, Gauss's with 64 nodes."""
+        nodes, weights = np.polynomial.legendre.leggauss(64)
+        r = np.asarray(r, dtype=float)
+        end = np.arcsin(np.minimum(radius / np.maximum(r, 1e-300), 1.0))
+        along = r[..., np.newaxis] * np.sin(0.5 * end[..., np.newaxis] * (1.0 + nodes))
+        depth = indentation - along * np.arctanh(along / sphere_radius)
+        inside = r <= radius
+        # a sphere ends at its equator
+        reach = np.minimum(r / sphere_radius, 1.0)
+        sphere = sphere_radius * reach**2 / (1.0 + np.sqrt(1.0 - reach**2))
+        sphere -= indentation
+        surface = -np.sum(weights * depth, axis=-1) * end / math.pi
+        return np.where(inside, sphere, surface), sphere
+
+
+@dataclass(frozen=True)
+class Layer(_Searched):
     """Incompressible elastic layer bonded to a rigid base, under a rigid sphere. Limit: half-space as h -> infinity.
 
     Parameters
@@ -312,33 +391,9 @@ class Layer(ElasticSolid):
     def compliance(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         return np.asarray(layer.compliance(qx, qy, self.thickness, self.shear_modulus))
 
-    def radius(self, mount: Mount, work: ArrayLike, sphere_radius: float) -> Array:
-        numbers = *mount, work, sphere_radius, self.contact_modulus, self.thickness
-        return np.asarray(equilibrium.radius_on_layer(*numbers))
-
-    def load(self, radius: ArrayLike, mount: Mount, sphere_radius: float) -> Array:
-        numbers = *mount, sphere_radius, self.contact_modulus, self.thickness
-        return np.asarray(equilibrium.load_on_layer(radius, *numbers))
-
-    def indentation(
-        self, radius: ArrayLike, mount: Mount, sphere_radius: float
-    ) -> Array:
-        numbers = *mount, sphere_radius, self.contact_modulus, self.thickness
-        return np.asarray(equilibrium.indentation_on_layer(radius, *numbers))
-
-    def contact_energy(
-        self, radius: ArrayLike, indentation: ArrayLike, sphere_radius: float
-    ) -> Array:
-        numbers = sphere_radius, self.contact_modulus, self.thickness
-        return np.asarray(equilibrium.energy_on_layer(radius, indentation, *numbers))
-
     def normal_stiffness(self, radius: float) -> float:
         flat = layer.contact_function(layer.G_1, radius / self.thickness)
         return 2.0 * self.contact_modulus * radius * float(flat)
-
-    def pull_off_load(self, work: float, sphere_radius: float) -> float:
-        numbers = sphere_radius, self.contact_modulus, self.thickness
-        return float(equilibrium.pull_off_load_on_layer(work, *numbers))
 
     def tangential_compliance(self, radius: ArrayLike) -> Array:
         numbers = self.shear_modulus, self.thickness

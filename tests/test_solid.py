@@ -124,6 +124,30 @@ def test_a_rigid_sphere_stiffens_a_compressible_solid_and_no_other():
     assert HalfSpace(1.7).held_ratio == 0.5
 
 
+@pytest.mark.verify
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.1, 0.3, 0.49])
+def test_waves_under_a_rigid_sphere_move_as_those_of_the_package_tamaas(poisson_ratio):
+    tamaas = pytest.importorskip("tamaas", reason="in the extra peers")
+    modulus, count = 1.7, 16
+    surface = tamaas.model_type.surface_2d
+    model = tamaas.ModelFactory.createModel(surface, [2 * np.pi] * 2, [count] * 2)
+    model.E, model.nu = 2.0 * modulus * (1.0 + poisson_ratio), poisson_ratio
+    along = np.arange(count) * 2.0 * np.pi / count
+    for qx, qy in ((1, 0), (0, 2), (1, 2)):
+        wave = np.cos(qx * along[:, np.newaxis] + qy * along)
+        moved = np.empty((3, 3), complex)
+        for stress in range(3):
+            model.traction[:] = 0.0
+            model.traction[..., stress] = wave
+            model.solveNeumann()
+            displacement = np.fft.fft2(model.displacement, axes=(0, 1))[qx, qy]
+            moved[:, stress] = displacement / np.fft.fft2(wave)[qx, qy]
+        # a normal stress that adjusts itself holds the normal displacement
+        held = moved[0, 0] - moved[0, 2] * moved[2, 0] / moved[2, 2]
+        exact = HalfSpace(modulus, poisson_ratio).compliance(float(qx), float(qy))
+        assert_allclose(held, exact, rtol=1e-12, atol=0)
+
+
 def test_the_force_of_a_uniform_stress_does_the_work_that_the_solid_stores():
     radius, stress = np.array([0.3, 2.0]), 5.0
     for poisson_ratio in (0.0, 0.3, 0.5):

@@ -30,7 +30,6 @@ from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
 from sim.parts.shear.modes import ModalProcess
 from sim.quantities import SOURCES
-from sim.scenario.checks import LARGEST_STRAIN
 from sim.scenario.scenario import Record, Scenario
 from sim.scenario.schema import Entry, distinct, entries
 from sim.units.notation import engineering
@@ -416,7 +415,12 @@ def _contact(points: Sequence[Scenario]) -> Rows:
     rows: Rows = [(f"{theory} radius", _span(closed, "m"))] if closed else []
     if lost:
         rows.append(("open", f"beyond pull-off at {lost} of {len(points)} points"))
-    return [*rows, ("pull-off load", _span(loads, "N"))] if loads else rows
+    if loads:
+        rows.append(("pull-off load", _span(loads, "N")))
+    gaps = [point.contact.jump_in_distance(point.adhesion.work) for point in points]
+    if max(gaps) > 0.0:
+        rows.append(("jump into contact", f"at a distance of {_span(gaps, 'm')}"))
+    return rows
 
 
 def _limits(points: Sequence[Scenario]) -> Rows:
@@ -435,9 +439,11 @@ def _limits(points: Sequence[Scenario]) -> Rows:
         meaning = f"for z0 = {of_range} nm; JKR's theory holds above about {JKR_FROM:g}"
         rows.append(("Tabor number", _span(tabor, digits=".3g"), meaning))
     if slopes := [row.slope for row in known if row.slope > 0.0]:
-        meaning = (
-            f"strain of the solid; a parabola is a sphere below about {LARGEST_STRAIN}"
-        )
+        meaning = "strain of the solid"
+        off = [row.parabola for row in known if math.isfinite(row.parabola)]
+        if off:
+            share = f"{100.0 * max(off):.2g} %"
+            meaning += f"; the area of a parabola is up to {share} larger than that of a sphere"
         rows.append(("a/R", _span(slopes, digits=".3g"), meaning))
     if strains := [row.strain for row in known if row.strain > 0.0]:
         meaning = "shear strain of the surface; finite strains reduce the area from about 0.1 on"

@@ -534,7 +534,7 @@ NUMBERS = (
     Variable(
         "jkr_pull_off_load",
         "",
-        lambda scene: scene.elastic.pull_off_load(
+        lambda scene: scene.bodies.solid.pull_off_load(
             scene.adhesion.work, scene.sphere.radius
         ),
     ),

@@ -14,6 +14,10 @@ where P = 0 if k > 0. ``punch`` has these terms for a sphere. On a half-space de
 1/C = 2 E* a, so that ``q = 2 pi a (w - t a)/E*``. ``sim.laws.layer`` has those on a layer, where
 t a is t times ``stress_reach`` and t must not be negative.
 
+**Profile.** These are the terms of a parabola. A sphere has the profile of a circle, with which a half-space has, for
+s = a/R, ``delta_H = R s artanh s`` and ``P_H = E* R^2 ((1 + s^2) artanh s - s)`` (Segedin 1957). To the next order they
+are those of the parabola times ``1 + s^2/3`` and ``1 + 2 s^2/5``. The radius is below R.
+
 **Convexity.** On a half-space y is convex in a where it is positive: its second derivative over a is
 ``2/R - 2a/(R (c + a)) + 2y/(c + a)^2`` with c = k/(2 E*), and c >= 0. For t >= 0 the root of q is concave, because q is
 a concave parabola, so that ``y - sqrt(q)`` and ``y^2 - q`` are convex. For t < 0 ``y^2 - q`` is convex on the right of
@@ -25,7 +29,8 @@ the search.
 
 **On a layer** neither holds. Under a load ``y - sqrt(q)`` has one minimum at most, but behind a spring it may have two
 if adhesion is strong, and the contact then has two stable radii. ``_on_layer`` keeps Newton's steps in a bracket and
-looks for the minimum between two places if there is one. A search that starts on the right finds the wider contact.
+looks for the minimum between two places if there is one. A search that starts on the right finds the wider contact. A
+circle has the same search, because its radius has an upper end.
 
 **Never below Hertz.** The edge can pull but not push. If no work of adhesion is left at Hertz's radius, the contact has
 that radius, the zero of y. Only a mount that presses has such a contact.
@@ -44,6 +49,10 @@ _CLOSE, _MOST = 1e-14, 200
 _ROUNDING = 1e-15
 #: Halvings that find a minimum on a layer down to rounding; step of the search for a narrower contact, and its end.
 _HALVINGS, _NARROWER, _LEAST = 50, 0.8, 1e-5
+#: Thickness, and inverse of it, that stand for a half-space under the profile of a circle.
+CIRCLE = -1.0
+#: (a/R)^2 below which Hertz's load of a circle is summed as a series, its terms, and most terms of the energy.
+_SERIES_BELOW, _TERMS, _MOST_TERMS = 0.1, 16, 100_000
 
 
 @device
@@ -64,9 +73,30 @@ def half_space(radius, body):
     )
 
 
+@device
+def circle(radius, body):
+    """Return the terms of ``punch`` on a half-space under the profile of a circle; ``radius``: below R."""
+    curvature, modulus, _ = body
+    share = radius * curvature
+    square, turn, load = share * share, math.atanh(share), 0.0
+    if square < _SERIES_BELOW:
+        # (1 + s^2) artanh s - s, the sum of 4k/(4k^2 - 1) s^(2k + 1)
+        for k in range(_TERMS, 0, -1):
+            load = load * square + 4.0 * k / (4.0 * k * k - 1.0)
+        load *= square * share
+    else:
+        load = (1.0 + square) * turn - share
+    _, _, _, stiffness, rise, toll, toll_slope = half_space(radius, body)
+    load *= modulus / (curvature * curvature)
+    growth = turn + share / (1.0 - square)
+    return radius * turn, growth, load, stiffness, rise, toll, toll_slope
+
+
 @inlined
 def punch(radius, body):
-    """Return the terms of a sphere on a solid at a contact radius; ``body``: 1/R, E* and 1/h, 0 without a layer.
+    """Return the terms of a sphere on a solid at a contact radius.
+
+    ``body``: 1/R, E* and 1/h, 0 without a layer and ``CIRCLE`` without a layer under the profile of a circle.
 
     They are Hertz's depth and its slope over the radius, Hertz's load, 1/C and its slope, and the square of the missing
     depth per energy release rate, 4 pi a over the slope of 1/C, with its slope.
@@ -74,7 +104,30 @@ def punch(radius, body):
     terms = half_space(radius, body)
     if body[2] > 0.0:
         terms = layer.sphere(radius, body[0], body[1], body[2])
+    elif body[2] < 0.0:
+        terms = circle(radius, body)
     return terms
+
+
+@device
+def _circle_energy(share):
+    """Return the contact functions of ``elastic_energy`` of a circle at a share a/R below 1.
+
+    They are ``int theta ds`` and ``int theta^2 ds`` from 0 to a, ``theta = s artanh(s/R)``, over a^3/R and a^5/R^2.
+    """
+    _, _, load, _, _, _, _ = circle(share, (1.0, 1.0, CIRCLE))
+    mixed = (math.atanh(share) - 0.5 * load / (share * share)) / share
+    # artanh^2 s is the sum of (1 + 1/3 + ... + 1/(2k - 1))/k s^(2k)
+    power, odd, sphere, k = 1.0, 0.0, 0.0, 0
+    while k < _MOST_TERMS:
+        k += 1
+        odd += 1.0 / (2.0 * k - 1.0)
+        term = power * odd / (k * (2.0 * k + 3.0))
+        sphere += term
+        if term < 1e-17 * sphere:
+            break
+        power *= share * share
+    return mixed, sphere
 
 
 @device
@@ -86,6 +139,8 @@ def elastic_energy(radius, indentation, body):
         _, _, _, _, flat, mixed, sphere = layer.contact_functions(
             radius * inverse_thickness
         )
+    elif inverse_thickness < 0.0 and radius > 0.0:
+        mixed, sphere = _circle_energy(radius * curvature)
     hertz = radius * radius * curvature
     square = flat * indentation * indentation - 2.0 * mixed * hertz * indentation
     return modulus * radius * (square + sphere * hertz * hertz)
@@ -117,7 +172,7 @@ def surplus(radius, left, mount, body):
 @device
 def stress_reach(radius, inverse_thickness):
     """Return what multiplies the tilt in the energy of a uniform stress, the radius on a half-space, and its slope."""
-    if inverse_thickness == 0.0:
+    if inverse_thickness <= 0.0:
         return radius, 1.0
     x = radius * inverse_thickness
     _, _, n, n_slope = layer.shear_functions(x)
@@ -126,7 +181,7 @@ def stress_reach(radius, inverse_thickness):
 
 @device
 def _lack(a, work, tilt, mount, body):
-    """Return y - sqrt(q) at a radius on a layer, its slope, and that of G less the work left, inf without work left.
+    """Return y - sqrt(q) at a radius, its slope, and that of G less the work left, inf without work left.
 
     Without work left q is 0.
     """
@@ -164,12 +219,16 @@ def _between(left, right, work, tilt, mount, body):
 
 @device
 def _on_layer(start, work, tilt, mount, body):
-    """Return the largest stable radius on a layer, and the slope of the energy release rate over the radius there.
+    """Return the largest stable radius on a layer or of a circle, and the slope of the energy release rate over it.
 
     It lies between ``low``, where y - sqrt(q) is not positive, and ``high``, where it is; 0 and inf are not known yet.
+    A circle is below its own radius.
     """
     apart()
     a, low, high = start, 0.0, math.inf
+    if body[2] < 0.0:
+        high = 1.0 / body[0]
+        a = a if a < high else 0.5 * high
     for _ in range(_MOST):
         over, slope, steepness = _lack(a, work, tilt, mount, body)
         if not abs(over) < math.inf:
@@ -217,7 +276,7 @@ def largest_radius(start, work, tilt, mount, body):
     load, base, spring = mount
     push, limit = (base if spring > 0.0 else load), math.inf
     bare = tilt >= 0.0 and work <= 0.0
-    if body[2] > 0.0:
+    if body[2] != 0.0:
         if tilt < 0.0:
             return math.nan, math.nan
         if bare and not push > 0.0:
@@ -272,6 +331,8 @@ def load_fold(work, body):
     if inverse_thickness == 0.0:
         return half_space
     low, high = 0.0, 2.0 * half_space
+    if inverse_thickness < 0.0:
+        high = min(high, 1.0 / curvature)
     for _ in range(_MOST):
         middle = 0.5 * (low + high)
         if not low < middle < high:
@@ -286,7 +347,7 @@ def load_fold(work, body):
 
 
 # A sphere on a layer under any mount: load [N], displacement of the base [m] and stiffness behind it [N/m], 0 under a
-# load.
+# load. The thickness ``CIRCLE`` stands for a half-space under the profile of a circle.
 
 
 @law

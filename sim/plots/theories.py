@@ -17,6 +17,7 @@ from sim.plots.curves import SIGNS, Scene, beside, scene_along
 from sim.plots.measured import Line, Measured
 from sim.read import control, is_steady, pull_offs, setting, settled
 from sim.read.dataset import ensemble_mean, plain, stays_held
+from sim.read.observables import thickness_of
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {
@@ -125,6 +126,9 @@ def case_of(dataset: xr.Dataset) -> Case:
     if "solid_thickness" in dataset:
         cure = "omit solid.thickness to compare them on a half-space"
         raise ValueError(f"the theories are not known on a layer;  {cure}")
+    if not np.all(np.isinf(thickness_of(dataset))):
+        cure = "omit sphere.profile to compare them on a parabola"
+        raise ValueError(f"the theories are not known of a circle;  {cure}")
     settings = {
         "value": value,
         "work": setting(dataset, "adhesion.work"),
@@ -344,7 +348,7 @@ def _equilibria(
     """Draw JKR's equilibria up to the largest contact, each different curve once."""
     dataset, (force, length) = scene.statistics.dataset, factors
     reached: dict[tuple[float, ...], float] = {}
-    thickness = dataset.get("solid_thickness", xr.DataArray(math.inf))
+    thickness = thickness_of(dataset)
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
     for line in scene.lines:
         numbers = (work, size, dataset["contact_modulus"], thickness, stiffness)

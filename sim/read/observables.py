@@ -6,6 +6,7 @@ recorded contact is at that time.
 
 import contextlib
 import itertools
+import math
 from collections.abc import Collection
 
 import numpy as np
@@ -231,6 +232,13 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(shares, attrs=dataset.attrs)
 
 
+def thickness_of(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the thickness of the layer [m], inf of a half-space, and ``CIRCLE`` under the profile of a circle."""
+    thickness = dataset.get("solid_thickness", xr.DataArray(math.inf))
+    is_circle = word(dataset, "sphere.profile", "parabola") == "circle"
+    return xr.where(is_circle, equilibrium.CIRCLE, thickness)
+
+
 def radius_at_work(dataset: xr.Dataset, work: xr.DataArray) -> xr.DataArray:
     """Return the radius of a contact with a work of adhesion [J/m^2], held as the sphere is [m]; nan if it is open.
 
@@ -243,14 +251,14 @@ def radius_at_work(dataset: xr.Dataset, work: xr.DataArray) -> xr.DataArray:
         control(dataset),
         (work, setting(dataset, "sphere.radius"), dataset["contact_modulus"]),
     )
-    thickness, load = dataset.get("solid_thickness"), xr.DataArray(0.0)
+    thickness, load = thickness_of(dataset), xr.DataArray(0.0)
     if held.kind == "load":
         name = "applied_load" if "applied_load" in dataset else "contact_load"
         load = dataset[name]
     # an indentation is a displacement behind an infinite stiffness
     base = xr.DataArray(0.0) if held.kind == "load" else dataset[held.kind]
     spring = xr.DataArray(0.0) if held.kind == "load" else held.stiffness
-    if thickness is not None:
+    if not np.all(np.isinf(thickness)):
         on_layer = load, base, spring, *sphere, thickness
         return xr.apply_ufunc(equilibrium.radius_on_layer, *on_layer)
     if held.kind == "load":

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -20,6 +21,8 @@ _STEPS_A_CYCLE = 2
 _MOST_SLIPS = 2**16
 #: Contact radius over that of the sphere above which some unit must be wrong.
 _WIDEST = 10.0
+#: The same of a circle, which is never wider.
+_WIDEST_CIRCLE = 0.99
 #: Slip force over catch force of a bond above which no two lengths of a molecule explain it. A thermal pathway has the
 #: force kT over the distance to its barrier: from the 0.1 nm of a chemical bond to the 100 nm of a stretched protein.
 #: The number of sub-steps of a bond's life, and so the time of a run, grows with this ratio.
@@ -50,6 +53,7 @@ def faults_across(scene: Scene, built: bool = True) -> Faults:
         _too_short,
         _cannot_be_driven,
         _unknown_on_a_layer,
+        _unknown_of_a_circle,
         _unlike_contact,
         _lacks_bonds,
         _catch_is_too_weak,
@@ -121,6 +125,23 @@ def _unknown_on_a_layer(scene: Scene) -> Faults:
         yield ("solid", "thickness"), f"{fault}: give a thicker layer"
 
 
+def _unknown_of_a_circle(scene: Scene) -> Faults:
+    if scene.sphere.profile == "circle" and (cure := _no_circle(scene)):
+        known = "a circle is known on a half-space in JKR's theory only"
+        yield ("sphere", "profile"), f'{known}: {cure}, or take "parabola"'
+
+
+def _no_circle(scene: Scene) -> str:
+    """Return the cure of a scene whose sphere cannot have the profile of a circle, "" if it can."""
+    if scene.solid.thickness is not None:
+        return "omit solid.thickness"
+    if scene.solid.counter_body is not None:
+        return "omit solid.counter_body, because an elastic sphere is no half-space"
+    if scene.contact.theory != "JKR":
+        return 'use contact.model = "equilibrium"'
+    return ""
+
+
 def _lacks_bonds(scene: Scene) -> Faults:
     shear, bonds = scene.fluctuations, scene.population
     if bonds.stretched and bonds.rebinding_rate == 0.0 and bonds.start_from != "bonded":
@@ -174,7 +195,8 @@ def _implausible(scene: Scene) -> Faults:
     if contact.lags and not scene.adhesion.work > 0.0:
         fault = "a rate-dependent edge needs a work of adhesion at rest; give adhesion.work above zero"
         yield ("adhesion", "work"), fault
-    if radius > _WIDEST * size:
+    widest = _WIDEST_CIRCLE if scene.sphere.profile == "circle" else _WIDEST
+    if radius > widest * size:
         fault = f"makes a contact of {radius:.3g} m on a sphere of {size:.3g} m radius, for which no theory holds;"
         yield (
             ("contact", contact.kind),
@@ -266,6 +288,8 @@ class Limits(NamedTuple):
         Tabor number at each of the likely distances of the attraction [1].
     slope, strain : float
         Largest contact radius over that of the sphere, and largest mean stress over the shear modulus [1].
+    parabola : float
+        Largest area of a parabola over that of a circle, less 1 [1]; nan if that of a circle is not known.
     tensions, capillary : tuple of float
         Surface tensions [N/m], which no scenario gives: half of the work of adhesion, as of two equal solids without
         any energy of their interface, and that of water. The elastocapillary length of each [m].
@@ -274,6 +298,7 @@ class Limits(NamedTuple):
     tabor: tuple[float, float]
     slope: float
     strain: float
+    parabola: float
     tensions: tuple[float, float]
     capillary: tuple[float, float]
 
@@ -292,9 +317,26 @@ def limits(scene: Scene) -> Limits:
         (float(tabor[0]), float(tabor[1])),
         scene.widest / size,
         float(np.max(strength)) / solid.shear_modulus,
+        _of_parabola(scene),
         (low, high),
         (float(lengths[0]), float(lengths[1])),
     )
+
+
+def _of_parabola(scene: Scene) -> float:
+    """Return the largest area of a parabola over that of a circle, less 1; nan if that of a circle is not known."""
+    if _no_circle(scene):
+        return math.nan
+    radii = [
+        scene.contact.largest_radius(
+            scene.adhesion.work,
+            scene.bodies._replace(
+                solid=replace(scene.sphere, profile=profile).on(scene.solid.elastic)
+            ),
+        )
+        for profile in ("parabola", "circle")
+    ]
+    return (radii[0] / radii[1]) ** 2 - 1.0 if radii[1] > 0.0 else math.nan
 
 
 def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
@@ -306,9 +348,11 @@ def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
             f' JKR\'s theory holds above about {JKR_FROM:g}; contact.model = "cohesive" has a range of adhesion'
         )
     if known.slope > LARGEST_STRAIN:
+        cure = 'sphere.profile = "circle" has no error of the profile'
+        is_circle = scene.sphere.profile == "circle" or math.isnan(known.parabola)
         yield (
             f"the contact radius reaches {known.slope:.2g} of the sphere's, beyond {LARGEST_STRAIN}: the theory is"
-            " valid for small contacts"
+            f" valid for small contacts{'' if is_circle else f'; {cure}'}"
         )
     if known.strain > LARGEST_STRAIN:
         yield f"the mean stress is {known.strain:.2g} times the shear modulus, beyond linear elasticity"

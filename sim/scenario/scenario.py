@@ -458,7 +458,7 @@ class Scenario:
     @cached_property
     def bodies(self) -> Bodies:
         """Return the sphere and the solid as the contact sees them."""
-        return Bodies(self.sphere.radius, self.elastic)
+        return Bodies(self.sphere.radius, self.sphere.on(self.elastic))
 
     @property
     def widest(self) -> float:

@@ -277,7 +277,8 @@ def fit(
     free : iterable of str
         Keys, each ``"KEY"`` or ``"KEY=LOW:HIGH"`` with bounds such as ``"1 mm/s:100 mm/s"``.
     common : dict, optional
-        Relative errors that all points of a variable share, as of one lens or one camera.
+        Relative errors that all points of a variable share, as of one lens or one camera. That of the mount, such as
+        ``"normal_load"``, is the error of the spring constant behind all loads.
     steady : bool
         True if steady sliding is enough, so that the scenario's own models are not run.
     per_table : iterable of str

@@ -6,7 +6,7 @@ sliding at its speed, with the mean of the fluctuations and the edge in equilibr
 everything else: members, clock steps, histories, edges that lag.
 
 A number above zero without an upper bound is fitted in its logarithm. The sum of squares is over errors; a relative
-error that curves share is one more number, known to be 0 within its size.
+error that curves share, or that the readings of the mount share, is one more number, known to be 0 within its size.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, optimize, stats
 from scipy.stats import qmc
 
@@ -364,7 +364,8 @@ class Group(NamedTuple):
 
     ``scenario`` has them; ``rows`` are their places in the table, ``time`` [s] and ``speed`` [m/s] theirs, shape
     (rows, 1): the contact's course is one over ``time``. If ``has_mount``, the mount was measured at the rows. If
-    ``has_history``, its course is a history, which the contact follows from the first row on.
+    ``has_history``, its course is a history, which the contact follows from the first row on. ``scale`` is the true
+    value of the mount over its reading.
     """
 
     scenario: Scenario
@@ -374,6 +375,7 @@ class Group(NamedTuple):
     elapsed: Array
     has_mount: bool
     has_history: bool
+    scale: float = 1.0
 
 
 def groups(scenario: Scenario, table: Measured) -> list[Group]:
@@ -437,10 +439,9 @@ def by_steady_sliding(
         group.scenario, {key: value for key, value in values.items() if "." in key}
     )
     zero = scenario.zero
-    if zero is not None and group.has_mount:
-        scenario = _at_true_mount(
-            scenario, zero.at(scenario.contact.kind, group.elapsed)
-        )
+    if group.has_mount:
+        off = 0.0 if zero is None else zero.at(scenario.contact.kind, group.elapsed)
+        scenario = _at_true_mount(scenario, off, group.scale)
     course = (
         history_at_rest(scenario, group.time)
         if group.has_history
@@ -476,15 +477,16 @@ def by_steady_sliding(
     return {name: x + zero.at(name, group.elapsed) for name, x in result.items()}
 
 
-def _at_true_mount(scenario: Scenario, off: Array) -> Scenario:
-    """Return a scenario whose mount is less by some amounts at its rows, the readings at the instrument's zero."""
+def _at_true_mount(scenario: Scenario, off: ArrayLike, scale: float) -> Scenario:
+    """Return a scenario with the true mount: readings less those at the instrument's zero, times a scale."""
+    if scale == 1.0 and not np.any(off):
+        return scenario
     contact = scenario.contact
     key, value = f"contact.{contact.kind}", getattr(contact, contact.kind)
     if isinstance(value, float):
-        return changed(scenario, {key: value - float(np.ravel(off)[0])})
-    return changed(
-        scenario, {f"{key}.value": tuple((np.array(value.value) - off).tolist())}
-    )
+        return changed(scenario, {key: scale * (value - float(np.ravel(off)[0]))})
+    values = scale * (np.array(value.value) - off)
+    return changed(scenario, {f"{key}.value": tuple(values.tolist())})
 
 
 def by_runs(
@@ -498,6 +500,7 @@ def by_runs(
     result = np.empty((2, len(names), sum(len(group.rows) for group in groups)))
     for group in groups:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
+        scenario = _at_true_mount(scenario, 0.0, group.scale)
         runs = [(group.rows, scenario)]
         if not by_time:
             stills = (_still(scenario, group, k) for k in range(len(group.rows)))
@@ -584,8 +587,8 @@ _UNKNOWN = 1e3
 _PLACES, _RANGES, _STARTS = 8, (1.0, 0.25), 8
 #: The same if each prediction is a run.
 _RUN_PLACES, _RUN_RANGES, _RUN_STARTS = 3, (0.1,), 1
-#: Bound of an error that all points share, over its size.
-_MOST_COMMON = 5.0
+#: Bound of an error that all points share, over its size, and the largest one, below 1.
+_MOST_COMMON, _LARGEST_COMMON = 5.0, 0.9
 #: Places that are tried around a minimum, their distances from it in standard errors, and searches from the lowest.
 _AROUND, _DISTANCES, _BEHIND = 128, (1.0, 4.0), 4
 #: Lowest places beyond an end of an interval, and at its bound, from which another explanation is searched.
@@ -643,10 +646,10 @@ class Problem:
     ``values`` are all curves of all ``tables`` in turn, ``curve`` the number of each one's curve; ``sigma`` their
     standard errors, ``estimated`` where nobody gave them. ``shift`` is what the scenario's own models add to
     steady sliding at each of them, and ``noise`` its standard error. ``common`` are relative errors that all points
-    of a variable share. ``fixed`` and ``theory`` make another mechanism of the scenario. With ``by_run`` each
-    prediction is a run of the scenario's own models, as steady sliding does not depend on all that is free. A
-    ``spring`` is one more residual, which draws a quantity to a value. ``whitening`` has the places of curves with
-    correlated errors, and the root of their correlations, by which residuals become independent.
+    of a variable share, that of the mount included. ``fixed`` and ``theory`` make another mechanism of the scenario.
+    With ``by_run`` each prediction is a run of the scenario's own models, as steady sliding does not depend on all that
+    is free. A ``spring`` is one more residual, which draws a quantity to a value. ``whitening`` has the places of
+    curves with correlated errors, and the root of their correlations, by which residuals become independent.
     """
 
     tables: Sequence[Measured]
@@ -679,7 +682,8 @@ class Problem:
     @property
     def bounds(self) -> list[tuple[float, float]]:
         ends = [(item.inner(item.low), item.inner(item.high)) for item in self.free]
-        return ends + [(-_MOST_COMMON, _MOST_COMMON)] * len(self.common)
+        most = [min(_MOST_COMMON, _LARGEST_COMMON / x) for x in self.common.values()]
+        return ends + [(-end, end) for end in most]
 
     @property
     def widths(self) -> Array:
@@ -702,12 +706,21 @@ class Problem:
             if item.table in (-1, table)
         } | {**self.fixed}
 
+    def groups_at(self, x: Array) -> Sequence[list[Group]]:
+        """Return the groups with the common error of the mount."""
+        errors = zip(self.common.items(), x[len(self.free) :], strict=False)
+        of_mount = [size * e for (name, size), e in errors if name not in self.names]
+        if not of_mount:
+            return self.groups
+        scale = 1.0 / (1.0 + of_mount[0])
+        return [[item._replace(scale=scale) for item in table] for table in self.groups]
+
     def steady(self, x: Array, only: str = "") -> Array:
         """Return all curves in steady sliding, or by runs; or one variable at the rows of all curves."""
         if self.by_run:
             return self.sampled(x)[0]
-        result = []
-        for k, (table, groups) in enumerate(zip(self.tables, self.groups, strict=True)):
+        result, all_groups = [], self.groups_at(x)
+        for k, (table, groups) in enumerate(zip(self.tables, all_groups, strict=True)):
             names = [only] * len(table.curves) if only else table.names
             numbers, columns = self.of_table(x, k), np.empty((len(names), table.rows))
             for group in groups:
@@ -725,7 +738,7 @@ class Problem:
         runs = [
             by_runs(groups, self.of_table(x, k), table.names, "t" in table.conditions)
             for k, (table, groups) in enumerate(
-                zip(self.tables, self.groups, strict=True)
+                zip(self.tables, self.groups_at(x), strict=True)
             )
         ]
         return np.concatenate([rows.reshape(2, -1) for rows in runs], axis=1)
@@ -747,7 +760,8 @@ class Problem:
         ``along`` are the condition, a time, speed or mount, and the rows.
         """
         (key, rows), measured = along, self.tables[table]
-        group = next(item for item in self.groups[table] if rows[0] in item.rows)
+        here = self.groups_at(x)[table]
+        group = next(item for item in here if rows[0] in item.rows)
         known = {
             each: measured.conditions[each][rows]
             for each in COURSES
@@ -760,6 +774,7 @@ class Problem:
         curve = measured.curves[0]._replace(values=fine)
         points = measured._replace(conditions=between, curves=(curve,))
         (course,) = groups(group.scenario, points)
+        course = course._replace(scale=group.scale)
         values = self.of_table(x, table)
         return fine, by_steady_sliding(course, values, [name], self.theory)[name]
 
@@ -1264,10 +1279,10 @@ def problem_of(
     """Return the problem of some tables; ``BadInput`` if they hold fewer numbers than are free."""
     curves = [curve for table in tables for curve in table.curves]
     names = [curve.name for curve in curves]
-    for name in common.keys() - names:
-        raise BadInput(
-            [f"--common {name}: no such curve; measured: {', '.join(names)}"]
-        )
+    has_mount = all("mount" in table.conditions for table in tables)
+    known = [*dict.fromkeys(names), *[MOUNT[scenario.contact.kind][0]] * has_mount]
+    for name in common.keys() - {*known}:
+        raise BadInput([f"--common {name}: no such column; known: {', '.join(known)}"])
     values = np.concatenate([curve.values for curve in curves])
     if len(values) <= len(free):
         cure = "measure more, or free fewer keys"

@@ -16,6 +16,7 @@ import numpy as np
 from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
 from sim.study.likelihood import Free, Minimum, Problem, idle, minimum, spread
+from sim.units.errors import BadInput
 from sim.units.notation import chance
 from sim.units.quantity import Quantity
 
@@ -162,6 +163,9 @@ def draws_of(
 ) -> Iterator[Array]:
     """Yield curves with random errors, those that all points of a variable share included."""
     errors = np.hypot(problem.sigma, problem.noise)
+    if of_mount := problem.common.keys() - {*problem.names}:
+        cure = "--compare and --plan know common errors of curves alone; omit it"
+        raise BadInput([f"--common {', '.join(of_mount)}: {cure}"])
     while True:
         values = expected + errors * rng.standard_normal(len(expected))
         for name, size in problem.common.items():
@@ -241,8 +245,11 @@ def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     if is_stressed and still and min(shares) > 0.0:
         yield "bonds only", _less(problem, still, "shear.")
         yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
-    # theories are of a load or an indentation on a half-space, of a stress, and of equilibrium
-    is_known = scene.contact.kind != "displacement" and scene.solid.thickness is None
+    # theories are of a load or an indentation, of a parabola on a half-space, of a stress, and of equilibrium
+    is_known = (
+        scene.contact.kind != "displacement"
+        and not scene.bodies.solid.inverse_thickness
+    )
     if is_stressed and is_known and not problem.by_run:
         other = _less(problem, still | share, "shear.", "adhesion.bond_share")
         for theory, words in _THEORIES.items():

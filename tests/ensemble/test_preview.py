@@ -103,6 +103,12 @@ def test_the_contact_at_rest_its_stiffness_and_errors_of_the_cell_are_those_of_t
         cohesive.pull_off(0.0, 0.4, stress, 1e-7, scenario.solid.contact_modulus).load,
         rtol=1e-3,
     )
+    # the surfaces attract each other up to w/sigma; in JKR's theory they do not before they touch
+    gaps = row(lines, "jump into contact")[1].split()
+    reach = [9.0 * math.sqrt(3.0) / 16.0 * length for length in (1e-12, 0.4e-9)]
+    assert_allclose([float(gaps[4]), float(gaps[6])], reach, rtol=1e-3)
+    of_lens = blocks("soft_lens")["contact at rest"]
+    assert not any(line.startswith("jump into contact") for line in of_lens)
     short = {"clock.duration": "10 ms", "clock.step": "10 ms", "ensemble.members": 2}
     shown, dataset = (
         blocks("soft_lens", **short),

@@ -240,6 +240,9 @@ class Cohesive(Equilibrium):
         load = cohesive.pull_off(0.0, work, stress, *body).load
         return float(np.nan_to_num(load[0]))
 
+    def jump_in_distance(self, work: float) -> float:
+        return float(self.attraction.reach(np.full(1, work))[0])
+
     def distances(self, work: float) -> tuple[float, float]:
         stress = self.attraction.stress_at(np.full(1, work))[0]
         distance = self.range or cohesive.LENNARD_JONES * work / stress

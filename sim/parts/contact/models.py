@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from sim.laws.halfspace import coupling, gap, in_series, normal_displacement
+from sim.laws.halfspace import coupling, in_series
 from sim.laws.limits import DISTANCES
 from sim.numerics.jit import kernel
 from sim.parts.contact.balance import (
@@ -31,7 +31,7 @@ from sim.parts.contact.balance import (
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
-from sim.solid import ElasticSolid, HalfSpace, Layer
+from sim.solid import ElasticSolid, HalfSpace, Layer, UnderCircle
 from sim.spectrum.radial import PLANE
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import Prescribed, over_time, prescribed
@@ -155,9 +155,22 @@ class Sphere:
     ----------
     radius : float or str
         R [m].
+    profile : str, optional
+        ``parabola``, which JKR's theory takes for a sphere, is the same as none. ``circle`` is for contacts that are
+        not much smaller than the sphere. It needs a rigid sphere and a half-space.
     """
 
     radius: Annotated[float, Quantity("m", "radius of the sphere", "R", above=0)]
+    profile: Annotated[
+        Literal["parabola", "circle"] | None,
+        Field(description="profile of the sphere; if omitted, a parabola"),
+    ] = None
+
+    def on(self, solid: ElasticSolid) -> ElasticSolid:
+        """Return a solid as the contact with this sphere feels it."""
+        if self.profile == "circle" and isinstance(solid, HalfSpace):
+            return UnderCircle(solid.shear_modulus, solid.poisson_ratio)
+        return solid
 
 
 @keyed()
@@ -400,6 +413,10 @@ class _Controlled:
         """Return the lowest load that the contact bears under a dead load [N]."""
         return float(bodies.solid.pull_off_load(work, bodies.sphere_radius))
 
+    def jump_in_distance(self, work: float) -> float:
+        """Return the distance at which an approaching sphere jumps into contact [m]; 0 without a range of adhesion."""
+        return 0.0
+
     def distances(self, work: float) -> tuple[float, float]:
         """Return the ends of the range of likely equilibrium distances of the attraction [m]."""
         return DISTANCES
@@ -413,9 +430,7 @@ class _Controlled:
     ) -> tuple[Array, Array]:
         """Return the heights of half-space and sphere at distances from the axis of a contact at the start [m]."""
         indentation = self.control(0.0, 0.0).indentation(np.full(1, radius), bodies)[0]
-        shape = r, radius, indentation, bodies.sphere_radius
-        surface = -normal_displacement(*shape)
-        return surface, surface + gap(*shape)
+        return bodies.solid.heights(r, radius, indentation, bodies.sphere_radius)
 
     def largest_radius(self, work: float, bodies: Bodies) -> float:
         """Return the JKR radius for a work of adhesion as the control presses most [m]; 0 without equilibrium."""

@@ -151,7 +151,7 @@ def compliance(radius, slider):
     if slider.yielding_radius == 0.0:
         return slider.yielding, 0.0
     shear = slider.yielding_radius / radius
-    if slider.inverse_thickness == 0.0:
+    if slider.inverse_thickness <= 0.0:
         return slider.yielding + shear, -slider.yielding_radius / (radius * radius)
     m, m_slope, _, _ = shear_functions(radius * slider.inverse_thickness)
     slope = shear * (m_slope * slider.inverse_thickness - m / radius)
