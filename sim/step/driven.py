@@ -1,5 +1,6 @@
 """Stepper of a driven slider, whose motion is solved together with bonds and contact in sub-steps."""
 
+import bisect
 from typing import ClassVar, cast
 
 import numpy as np
@@ -9,7 +10,7 @@ from sim.parts.contact.models import Equilibrium
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
 from sim.parts.coupled.step_end import StepEnds
-from sim.parts.drive import Driven as Slider
+from sim.parts.drive import Driven as Slider, Spring
 from sim.parts.events import Events
 from sim.parts.exchange import NO_DRAWS, Array, Bonding, ContactState, Motion, Storing
 from sim.parts.shear.models import Model as FluctuationModel
@@ -65,11 +66,15 @@ class Driven(Stepper):
     ) -> tuple[State, Trajectory]:
         scene = self.scene
         drive, _, process, _ = parts = scene.parts
+        slider = cast(Slider, state.drive)
+        if is_unloaded := self._is_unloaded(steps):
+            spring = cast(Spring, drive)
+            parts, slider = parts._replace(drive=spring.relaxed), spring.unloaded(slider)
         around = self._around(state.contact, state.shear, steps)
         ends = self._ends(state, noise, steps)
         reached = coupled.advance(
             parts,
-            state.drive,
+            slider,
             state.bonds,
             around,
             scene.times,
@@ -85,6 +90,8 @@ class Driven(Stepper):
         balance = scene.work.balance(bonding, energy, motions.position)
         touch = self._touch(state.contact, motions, balance, ends)
         sliders, bonding = coupled.with_contact(parts, reached, around, touch.radius)
+        if is_unloaded:  # the stage follows the slider
+            sliders = sliders._replace(stage_position=sliders.position)
         history = self._events(state, steps, motions, bonding, touch)
         history = self._with_slips(history, motions, sliders, bonding)
         end = State(
@@ -100,6 +107,13 @@ class Driven(Stepper):
         return end, Trajectory.of(
             motions.time, motions, bonding, energy, readings, touch
         )
+
+    def _is_unloaded(self, steps: range) -> bool:
+        """Return True if a block lies in a hold in which the stage has relaxed the spring."""
+        drive, phases = self.scene.parts.drive, self.scene.phases
+        if not (isinstance(drive, Spring) and drive.unloads):
+            return False
+        return phases.rests[bisect.bisect_right(phases.steps, steps.start) - 1]
 
     def _touch(
         self, before: ContactState, motions: Motion, balance: Balance, ends: StepEnds
