@@ -428,16 +428,16 @@ class Force(_Driven):
 class StageHolds(tables.Holds):
     """Slide–hold–slide of a stage: sliding at a speed and holds in turn.
 
-    If ``unloaded``, the stage returns at the start of a hold until the spring is relaxed, and follows the slider, so
-    that no force acts on the body. The spring then has no force either when the stage moves again.
+    An *unloaded* hold is that in which the spring has no force: the stage returns at its start until the spring is
+    relaxed, and then follows the slider. The spring is relaxed, too, when the stage moves again.
     """
 
-    unloaded: Annotated[
-        bool,
+    while_held: Annotated[
+        Literal["rest", "unloaded"],
         Field(
-            description="true: the spring has no force in a hold; false: the stage rests"
+            description='"rest": the stage rests in a hold; "unloaded": it keeps the spring relaxed'
         ),
-    ] = False
+    ] = "rest"
 
 
 @keyed(kw_only=True)
@@ -479,7 +479,7 @@ class Spring(_Driven):
     @property
     def unloads(self) -> bool:
         """True if the spring has no force while the stage holds."""
-        return isinstance(self.stage, StageHolds) and self.stage.unloaded
+        return isinstance(self.stage, StageHolds) and self.stage.while_held == "unloaded"
 
     @cached_property
     def relaxed(self) -> Force:

@@ -1,4 +1,4 @@
-"""Figures of sliding: bond stress over speed with closed forms, starts from rest, stability, creep, incipient slip."""
+"""Figures of sliding: bond stress over speed with closed forms, starts from rest, stability, creep, incipient slip, holds."""
 
 import contextlib
 import re
@@ -21,7 +21,7 @@ from sim.plots.curves import (
     statement_curves,
 )
 from sim.plots.measured import Line, Measured
-from sim.read import Run, is_steady, setting, sweep_dims
+from sim.read import Run, is_steady, peaks_after_holds, setting, sweep_dims
 from sim.read.dataset import MEMBERS, stays_held, word
 from sim.read.events import incipient_law
 from sim.read.observables import with_slips
@@ -259,6 +259,68 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     style.across(panel, forces, unit.label("tangential force $Q$"))
     style.legend(panel, scene.title)
     return figure
+
+
+# -- peaks after holds ---------------------------------------------------------------------------
+
+
+def needs_holds(dataset: xr.Dataset) -> None:
+    """Refuse a dataset without friction peaks after holds of different times."""
+    each = peaks_after_holds(dataset)
+    if "time_held" not in each or np.unique(each["time_held"]).size < 3:
+        cure = '[drive] model = "holds" with holds = ["0.1 s", "1 s", "10 s"]'
+        raise ValueError(f"there are no holds of different times; set {cure}")
+    if each["peak_after_hold"].isnull().all():
+        raise ValueError(
+            "no friction peak follows a hold; make drive.slide longer, or the clock step shorter"
+        )
+
+
+def holds_figure(dataset: xr.Dataset) -> Figure:
+    """Friction peak after a hold over the time held, with its growth over a decade or the time after which it saturates.
+
+    Bars are standard errors over the members.
+    """
+    run, scene = Run(dataset), scene_along(dataset, "t")
+    peak, held = (
+        run.events[f"phase_{name}"] for name in ("peak_after_hold", "time_held")
+    )
+    figure, (panel,) = style.rows([2.4])
+    factor = style.in_unit(
+        panel.yaxis, "friction peak after a hold $F_s$", np.ravel(peak.value), "N"
+    )
+    unit = style.Unit.of(np.ravel(held.value), "s", logarithmic=True)
+    for line in scene.lines:
+        peaks, errors, times = (
+            np.ravel(each.isel(line.point, missing_dims="ignore"))
+            for each in (peak.value, 0.0 * peak.value + peak.sem, held.value)
+        )
+        order = np.argsort(times)[: np.isfinite(times).sum()]
+        x, y = unit.factor * times[order], factor * peaks[order]
+        words = _ageing_in_words(run, line)
+        label = ": ".join(filter(None, ["" if scene.single else line.label, words]))
+        look: Any = {"color": line.colour, "marker": "o", "markersize": 3.5}
+        panel.errorbar(x, y, factor * errors[order], label=label or None, **look)
+    reach = unit.factor * np.ravel(held.value)
+    style.across(panel, reach, unit.label("time held $t_h$"), "log", room=0.03)
+    panel.set_ylim(bottom=0.0)
+    style.legend(panel, scene.title)
+    return figure
+
+
+def _ageing_in_words(run: Run, line: Line) -> str:
+    """Return what the peaks after the holds at a point of the sweep say of ageing, "" if they say nothing."""
+    if "hold_growth" not in run.events:
+        return ""
+    growth, saturation = (
+        float(run.events[name].value.isel(line.point, missing_dims="ignore"))
+        for name in ("hold_growth", "hold_saturation")
+    )
+    if np.isfinite(growth):
+        return f"grows by {style.rounded(growth, 'N')} per decade"
+    if np.isfinite(saturation):
+        return f"saturates after {style.rounded(saturation, 's')}"
+    return ""
 
 
 # -- stress of the bonds ------------------------------------------------------------------------
