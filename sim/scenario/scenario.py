@@ -20,6 +20,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from sim.numerics.grid import Lattice
+from sim.laws.incipient import Incipient
 from sim.parts.bonds.models import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
 from sim.parts.contact.balance import Bodies, Shares
@@ -247,6 +248,7 @@ class Scenario:
     record: Record = Field(default_factory=Record)
     instrument: Instrument | None = None
     zero: Zero | None = None
+    incipient: Incipient | None = None
     sweep: Annotated[tuple[Any, ...], BeforeValidator(read_sweep)] = ()
     name: _Title = "sliding contact"
     seed: Annotated[
