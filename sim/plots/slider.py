@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sim.laws.incipient import Incipient
 from sim.plots import style
 from sim.plots.curves import (
     Scene,
@@ -21,7 +22,7 @@ from sim.plots.curves import (
     statement_curves,
 )
 from sim.plots.measured import Line, Measured
-from sim.read import Run, is_steady, peaks_after_holds, setting, sweep_dims
+from sim.read import Run, control, is_steady, peaks_after_holds, setting, sweep_dims
 from sim.read.dataset import MEMBERS, stays_held, word
 from sim.read.events import incipient_law
 from sim.read.observables import with_slips
@@ -229,7 +230,8 @@ def exponent_of(force: np.ndarray, area: np.ndarray, top: int) -> float:
 def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     """Contact area over the tangential force before sliding, and the law A0 − αQ² if the loss grows as a square.
 
-    Law and exponent are fitted by least squares up to half of the largest force.
+    Law and exponent are fitted by least squares up to half of the largest force. If the scenario has the table
+    ``[incipient]``, its empirical law and the theory of a sticking contact under a load are drawn instead.
     """
     scene = scene_along(dataset, "t")
     force, area = np.abs(scene.all("spring_force")), scene.all("contact_area")
@@ -247,7 +249,12 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
         known.append(unit.factor * force_of)
         scale = factor if absolute else 1.0 / area_of[0]
         words = f"loss as $Q^{{{power:.2f}}}$"
-        if _SQUARE[0] <= power <= _SQUARE[1]:
+        stated = _stated_laws(dataset, line.point, area_of[0], force_of)
+        for look, name, areas in stated:
+            look = look | {"color": line.colour, "linewidth": 0.9}
+            panel.plot(known[-1], scale * areas, **look)
+            panel.plot([], [], **look | {"color": style.BOTH}, label=name)
+        if not stated and _SQUARE[0] <= power <= _SQUARE[1]:
             words += rf", $\alpha$ = {1e6 * alpha:.3g} mm$^2$/N$^2$"
             law = scale * (area_of[0] - alpha * force_of**2)
             look = {} if scene.single else {"color": line.colour}
@@ -259,6 +266,40 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     style.across(panel, forces, unit.label("tangential force $Q$"))
     style.legend(panel, scene.title)
     return figure
+
+
+def _stated_laws(
+    dataset: xr.Dataset, point: dict[str, int], area: float, force: np.ndarray
+) -> list[tuple[dict[str, Any], str, np.ndarray]]:
+    """Return look, name and areas [m^2] of the empirical law of a scenario, and of the theory beside it.
+
+    ``area`` [m^2] is that at rest. There are none without the table ``[incipient]``. The theory is that of full stick
+    at a load.
+    """
+    if "incipient_shrinkage" not in dataset:
+        return []
+    from sim.laws import theories  # heavy: for this figure alone
+
+    def number(key: str) -> float:
+        return float(setting(dataset, key).isel(point, missing_dims="ignore"))
+
+    keys = "shrinkage", "area", "exponent"
+    law = Incipient(**{key: number(f"incipient.{key}") for key in keys})
+    result: list[tuple[dict[str, Any], str, np.ndarray]] = [
+        ({"linestyle": "--"}, r"empirical, $A_0 - \alpha Q^2$", law.area_at(area, force))
+    ]
+    if control(dataset).kind == "load" and "solid_thickness" not in dataset:
+        modulus, ratio = (
+            float(dataset[name].isel(point, missing_dims="ignore"))
+            for name in ("contact_modulus", "effective_poisson_ratio")
+        )
+        work, size = number("adhesion.work"), number("sphere.radius")
+        radius = theories.savkoor_briggs_at_load(
+            number("contact.load"), work, force, size, modulus, ratio
+        )
+        look = {"linestyle": ":"}
+        result.append((look, "Savkoor and Briggs, full stick", np.pi * radius**2))
+    return result
 
 
 # -- peaks after holds ---------------------------------------------------------------------------
