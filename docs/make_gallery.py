@@ -716,9 +716,9 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
     "incipient_fit",
     "How does the loss of area before sliding depend on the size of the contact?",
     """In this made-up table the area falls as A₀ − αQ², and α falls with the area at rest to the power {exponent}.
-    At 0.3 mm² the coefficient α is {shrinkage} mm²/N². The table was made with 3/2 and 200 mm²/N². The law is empirical,
-    so that the fit says nothing of its cause. `--compare` fits theories of a sticking contact to the same points.
-    Here each of them is rejected, because they predict much more loss, or a loss that depends otherwise on the size.""",
+    At 0.3 mm² the coefficient α is {shrinkage} mm²/N². The table was made with 3/2 and 200 mm²/N². The law is
+    empirical, so that the fit says nothing of its cause. `--compare` fits theories of a sticking contact to the same
+    points. Here each of them is rejected: it predicts much more loss, or a loss that depends otherwise on the size.""",
     free=("incipient.shrinkage", "incipient.exponent"),
 )
 def incipient_fit(result: Fit) -> dict[str, Number]:

@@ -53,7 +53,9 @@ def test_a_course_of_holds_is_the_table_of_its_rows():
     times = [0.0, 0.2, 0.2, 0.3, 0.3, 0.5, 0.5, 0.9, 0.9, 1.1]
     table = drive.Table(time=times, speed=3e-3 * np.resize([1, 1, 0, 0], 10))
     ends = np.linspace(0.0, 1.5, 41)
-    for own, other in zip(course.pieces(ends, 1.5), table.pieces(ends, 1.5), strict=True):
+    for own, other in zip(
+        course.pieces(ends, 1.5), table.pieces(ends, 1.5), strict=True
+    ):
         assert_allclose(own, other, rtol=1e-12, atol=1e-18)
     assert_allclose(course.lasts, 1.1, rtol=1e-15)
 
@@ -115,7 +117,10 @@ def test_a_slope_is_given_only_of_peaks_that_still_grow_and_a_saturation_else():
     expected = times[np.argmax(exponential[-1] - exponential < 0.1 * first)]
     assert_allclose(saturation, expected, rtol=1e-12)
     # peaks that fall, or of members that differ by more than what they gain, say nothing
-    for peaks in (-logarithmic[np.newaxis], logarithmic + np.array([[0.0], [1.0]]) * times):
+    for peaks in (
+        -logarithmic[np.newaxis],
+        logarithmic + np.array([[0.0], [1.0]]) * times,
+    ):
         slope, saturation, _ = _ageing(peaks, times)
         assert np.isnan([*slope, saturation]).all()
     # less than two decades
@@ -133,7 +138,9 @@ def test_the_table_has_a_row_for_each_peak_and_the_figure_its_numbers():
     x, y = panel.containers[0].lines[0].get_data()
     assert_allclose(x, HOLDS, rtol=1e-12)
     assert_allclose(y, 1e3 * peaks[np.isfinite(peaks)], rtol=1e-12)
-    assert any("per decade" in text.get_text() for text in figure.legends[0].get_texts())
+    assert any(
+        "per decade" in text.get_text() for text in figure.legends[0].get_texts()
+    )
     with pytest.raises(ValueError, match="holds"):
         sim.plot(held((0.1,), 2.2), "holds")
 

@@ -479,7 +479,9 @@ class Spring(_Driven):
     @property
     def unloads(self) -> bool:
         """True if the spring has no force while the stage holds."""
-        return isinstance(self.stage, StageHolds) and self.stage.while_held == "unloaded"
+        return (
+            isinstance(self.stage, StageHolds) and self.stage.while_held == "unloaded"
+        )
 
     @cached_property
     def relaxed(self) -> Force:

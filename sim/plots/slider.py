@@ -1,4 +1,4 @@
-"""Figures of sliding: bond stress over speed with closed forms, starts from rest, stability, creep, incipient slip, holds."""
+"""Figures of sliding: bond stress over speed with closed forms, starts from rest, creep, the way to sliding."""
 
 import contextlib
 import re
@@ -286,7 +286,11 @@ def _stated_laws(
     keys = "shrinkage", "area", "exponent"
     law = Incipient(**{key: number(f"incipient.{key}") for key in keys})
     result: list[tuple[dict[str, Any], str, np.ndarray]] = [
-        ({"linestyle": "--"}, r"empirical, $A_0 - \alpha Q^2$", law.area_at(area, force))
+        (
+            {"linestyle": "--"},
+            r"empirical, $A_0 - \alpha Q^2$",
+            law.area_at(area, force),
+        )
     ]
     if control(dataset).kind == "load" and "solid_thickness" not in dataset:
         modulus, ratio = (
@@ -318,7 +322,7 @@ def needs_holds(dataset: xr.Dataset) -> None:
 
 
 def holds_figure(dataset: xr.Dataset) -> Figure:
-    """Friction peak after a hold over the time held, with its growth over a decade or the time after which it saturates.
+    """Friction peak after a hold over the time held, with its growth per decade or the time after which it saturates.
 
     Bars are standard errors over the members.
     """

@@ -50,7 +50,6 @@ from sim.read.tables import (
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
-    "ageing",
     "GROUPS",
     "QUANTILES",
     "Control",
@@ -61,6 +60,7 @@ __all__ = [
     "Run",
     "SystematicError",
     "Table",
+    "ageing",
     "averaging",
     "bond_work",
     "concise",

@@ -342,7 +342,11 @@ def _ageing(peaks: Array, held: Array) -> tuple[Array, float, float]:
     first, last = (at_ends[:, k + 1] - at_ends[:, k] for k in (0, 2))
     excess = last - _STILL_GROWS * first
     for growth in (first, excess):
-        error = float(growth.std(ddof=1)) / math.sqrt(len(growth)) if len(growth) > 1 else 0.0
+        error = (
+            float(growth.std(ddof=1)) / math.sqrt(len(growth))
+            if len(growth) > 1
+            else 0.0
+        )
         if abs(growth.mean()) < _ALIKE * error:
             return none, math.nan, decades
     if not first.mean() > 0.0:

@@ -19,8 +19,8 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from sim.numerics.grid import Lattice
 from sim.laws.incipient import Incipient
+from sim.numerics.grid import Lattice
 from sim.parts.bonds.models import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
 from sim.parts.contact.balance import Bodies, Shares

@@ -69,7 +69,10 @@ class Driven(Stepper):
         slider = cast(Slider, state.drive)
         if is_unloaded := self._is_unloaded(steps):
             spring = cast(Spring, drive)
-            parts, slider = parts._replace(drive=spring.relaxed), spring.unloaded(slider)
+            parts, slider = (
+                parts._replace(drive=spring.relaxed),
+                spring.unloaded(slider),
+            )
         around = self._around(state.contact, state.shear, steps)
         ends = self._ends(state, noise, steps)
         reached = coupled.advance(

@@ -77,8 +77,9 @@ class Measured(NamedTuple):
     """One table: under which conditions which curves were measured.
 
     ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement),
-    ``"tangential_force"`` and those of other keys of the scenario. Rows have the same numbers in all columns. ``mount`` is the key of the contact that
-    holds the sphere. The first ``baseline`` rows were measured before the contact; ``noise`` is that of curves there.
+    ``"tangential_force"`` and those of other keys of the scenario. Rows have the same numbers in all columns. ``mount``
+    is the key of the contact that holds the sphere. The first ``baseline`` rows were measured before the contact;
+    ``noise`` is that of curves there.
     """
 
     path: Path
@@ -386,8 +387,8 @@ class Group(NamedTuple):
 
     ``scenario`` has them; ``rows`` are their places in the table, ``time`` [s] and ``speed`` [m/s] theirs, shape
     (rows, 1): the contact's course is one over ``time``. If ``has_mount``, the mount was measured at the rows. If
-    ``has_history``, its course is a history, which the contact follows from the first row on. ``force`` is the tangential
-    force of contacts that do not slide [N], of the shape of ``time``, None if they slide.
+    ``has_history``, its course is a history, which the contact follows from the first row on. ``force`` is the
+    tangential force of contacts that do not slide [N], of the shape of ``time``, None if they slide.
     """
 
     scenario: Scenario

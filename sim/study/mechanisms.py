@@ -15,15 +15,7 @@ import numpy as np
 
 from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
-from sim.study.likelihood import (
-    AT_FORCE,
-    Free,
-    Minimum,
-    Problem,
-    idle,
-    minimum,
-    spread,
-)
+from sim.study.likelihood import AT_FORCE, Free, Minimum, Problem, idle, minimum, spread
 from sim.units.notation import chance
 from sim.units.quantity import Quantity
 

@@ -792,7 +792,9 @@ class Holds(Rows):
             times += [times[-1], times[-1] + hold]
             times += [times[-1], times[-1] + self.slide]
         count = len(self.holds)
-        return np.array(times), self.speed * np.resize([1.0, 1.0, 0.0, 0.0], 4 * count + 2)
+        return np.array(times), self.speed * np.resize(
+            [1.0, 1.0, 0.0, 0.0], 4 * count + 2
+        )
 
     @property
     def lasts(self) -> float:
@@ -802,7 +804,7 @@ class Holds(Rows):
 
 def _kind(value: Any) -> str:
     if isinstance(value, Holds) or (isinstance(value, dict) and "holds" in value):
-        return "[holds]"
+        return "[list of holds]"
     if isinstance(value, Table) or (
         isinstance(value, dict) and ("file" in value or "time" in value)
     ):
@@ -844,7 +846,7 @@ def over_time(unit: Quantity, name: str, holds: type[Holds] | None = None) -> An
     )
     kinds = number | course | Annotated[_Table, Tag("[table]")]
     if holds is not None:
-        kinds |= Annotated[holds, Tag("[holds]")]  # type: ignore[valid-type]
+        kinds |= Annotated[holds, Tag("[list of holds]")]  # type: ignore[valid-type]
     return Annotated[kinds, Discriminator(_kind)]
 
 
