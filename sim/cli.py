@@ -465,6 +465,8 @@ _KINDS = {
     "stability": "Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed,"
     " with theory.",
     "creep": "Displacement and speed of the slider over time under a prescribed force. A cross marks a runaway. --data",
+    "holds": "Friction peak after a hold over the time held, with its growth per decade or the time after which it"
+    " saturates.",
     "friction": "Friction force over time and over the slider's position. --data",
     "curve": "Contact area with the loss by each mechanism, energies and friction, over speed. --x --absolute --data",
     "sweep": "Contact radius, energies and friction over the first swept key. Each value of a further key is a"

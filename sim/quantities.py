@@ -1062,6 +1062,25 @@ OF_MEMBERS: tuple[Definition, ...] = (
         absent=NO_MAXIMUM,
     ),
     Definition(
+        "hold_growth",
+        "N",
+        "growth of the peak after a hold over a decade of the time held",
+        heading="growth per decade held",
+        absent=(
+            "the peak after a hold saturates or does not grow, or members differ too much"
+        ),
+    ),
+    Definition(
+        "hold_saturation",
+        "s",
+        "time held after which the peak grows by less than a tenth of its growth in the first decade",
+        heading="saturates after",
+        absent=(
+            "the peak after a hold grows in the last decade by a tenth of the growth in "
+            "the first or more, or not in the first, or members differ too much"
+        ),
+    ),
+    Definition(
         "static_friction",
         "N",
         "largest force before a slip event, or force at which the slider lost stability",

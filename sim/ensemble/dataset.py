@@ -299,7 +299,8 @@ def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:
 
     ``per_member`` is True if every member is recorded, for a scenario that leaves this to the size of the run.
     """
-    of_fits = {name for name in ("instrument", "zero") if not getattr(scenario, name)}
+    optional = "instrument", "zero", "incipient"
+    of_fits = {name for name in optional if not getattr(scenario, name)}
     dumped = TypeAdapter(Scenario).dump_python(
         scenario, by_alias=True, exclude={"source", "sweep"} | of_fits, mode="json"
     )

@@ -19,7 +19,16 @@ Values = Mapping[str, float]
 #: Relative step of a sensitivity; sensitivities below this are none.
 _STEP, _NOTHING = 1e-4, 1e-6
 #: Tables whose numbers do not matter to steady sliding at a given speed.
-_NO_PHYSICS = ("clock", "drive", "ensemble", "instrument", "record", "seed", "zero")
+_NO_PHYSICS = (
+    "clock",
+    "drive",
+    "ensemble",
+    "incipient",
+    "instrument",
+    "record",
+    "seed",
+    "zero",
+)
 
 
 def steady_course(

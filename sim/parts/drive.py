@@ -1,4 +1,4 @@
-"""Motion of the slider. Simple to full: steady, start, ramp, table, force, spring.
+"""Motion of the slider. Simple to full: steady, start, ramp, table, holds, force, spring.
 
 A prescribed drive is a function of time, the same for all members. It gives the exact slip of a step, never the speed
 times the step, so that parts that live on slip see no step error.
@@ -9,6 +9,7 @@ Slider and bonds are solved together by ``sim.parts.coupled``.
 """
 
 import math
+from dataclasses import fields
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -186,6 +187,33 @@ class Table(tables.Table, _Sliding):
 
     speed: Annotated[tuple[Annotated[float, _SPEED], ...], tables.LISTED] = ()
     model: Literal["table"] = "table"
+
+
+def _too_few_holds(course: object, after: float, setting: Setting) -> list[str]:
+    """Return a remark if a run ends before the slider has slid after the last hold of a course."""
+    if not isinstance(course, tables.Holds):
+        return []
+    lasts = after + course.lasts
+    if setting.times.duration >= lasts * (1.0 - 1e-9):
+        return []
+    return [
+        f"the run ends before the last hold has its peak: set clock.duration to {lasts:.6g} s or more"
+    ]
+
+
+@keyed(kw_only=True)
+class Holds(tables.Holds, _Sliding):
+    """Slide–hold–slide: sliding at a speed and holds at rest in turn; bonds age in the holds.
+
+    >>> drive = Holds(speed=1e-3, slide=2.0, holds=(1.0, 10.0))
+    >>> float(drive.motion(1, 0.0, 17.0, 17.0).slip[0])
+    0.006
+    """
+
+    model: Literal["holds"] = "holds"
+
+    def remarks(self, setting: Setting) -> list[str]:
+        return _too_few_holds(self, 0.0, setting)
 
 
 _Tolerance = Annotated[
@@ -397,10 +425,28 @@ class Force(_Driven):
 
 
 @keyed(kw_only=True)
+class StageHolds(tables.Holds):
+    """Slide–hold–slide of a stage: sliding at a speed and holds in turn.
+
+    An *unloaded* hold is that in which the spring has no force: the stage returns at its start until the spring is
+    relaxed, and then follows the slider. The spring is relaxed, too, when the stage moves again.
+    """
+
+    while_held: Annotated[
+        Literal["rest", "unloaded"],
+        Field(
+            description='"rest": the stage rests in a hold; "unloaded": it keeps the spring relaxed'
+        ),
+    ] = "rest"
+
+
+@keyed(kw_only=True)
 class Spring(_Driven):
     """A stage that pulls the body through a spring: stick-slip. Limit: the stage's own motion as K -> infinity."""
 
-    stage: tables.over_time(Quantity("m/s", "speed of the stage", "V"), "speed")  # type: ignore[valid-type]
+    stage: tables.over_time(  # type: ignore[valid-type]
+        Quantity("m/s", "speed of the stage", "V"), "speed", StageHolds
+    )
     stiffness: Annotated[
         float, Quantity("N/m", "stiffness of the spring", "K", above=0)
     ]
@@ -426,6 +472,34 @@ class Spring(_Driven):
     @property
     def end(self) -> float:
         return self.start_after + self.course.end
+
+    def remarks(self, setting: Setting) -> list[str]:
+        return _too_few_holds(self.stage, self.start_after, setting)
+
+    @property
+    def unloads(self) -> bool:
+        """True if the spring has no force while the stage holds."""
+        return (
+            isinstance(self.stage, StageHolds) and self.stage.while_held == "unloaded"
+        )
+
+    @cached_property
+    def relaxed(self) -> Force:
+        """Drive of the same body without a spring: its limit K -> 0 at no force."""
+        kept = {each.name: getattr(self, each.name) for each in fields(_Driven)}
+        return Force(force=0.0, **kept)
+
+    def unloaded(self, slider: Driven) -> Driven:
+        """Return the slider after the stage has taken back the energy of the spring, F²/(2K)."""
+        returned = 0.5 * slider.spring_force**2 / self.stiffness
+        energies = slider.energies.copy()
+        for name in ("work", "stored"):
+            energies[..., (ENERGY.names or ()).index(name)] -= returned
+        return slider._replace(
+            spring_force=0.0 * slider.spring_force,
+            stage_position=slider.position,
+            energies=energies,
+        )
 
     def first(self, duration: float) -> float:
         return 0.0 if self.start_after > 0.0 else super().first(duration)
@@ -474,5 +548,5 @@ def _shifted(pieces: tables.Pieces, time: float) -> tables.Pieces:
 
 
 Drive = Annotated[
-    Steady | Start | Ramp | Table | Force | Spring, Field(discriminator="model")
+    Steady | Start | Ramp | Table | Holds | Force | Spring, Field(discriminator="model")
 ]

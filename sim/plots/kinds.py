@@ -192,6 +192,11 @@ def _never(dataset: xr.Dataset) -> bool:
     return False
 
 
+def _has_holds(dataset: xr.Dataset) -> bool:
+    """Fit a dataset whose drive has a list of holds."""
+    return '"holds"' in str(dataset.attrs.get("scenario_resolved", ""))
+
+
 _OF_THEORY = ("shear_stress", "contact_area")
 _OF_CURVE = ("speed", "contact_area", "jkr_radius", "hertz_radius")
 #: All figures, by name. The default of a dataset is the first kind that fits it.
@@ -216,6 +221,7 @@ KINDS: dict[str, Kind] = {
     "creep": Kind(
         slider.creep_figure, slider.needs_force, reads=("slider_position", "speed")
     ),
+    "holds": Kind(slider.holds_figure, slider.needs_holds, _has_holds),
     "friction": Kind(
         curves.friction_figure, curves.needs_friction, curves.turns, ("speed",)
     ),

@@ -1,4 +1,4 @@
-"""Figures of sliding: bond stress over speed with closed forms, starts from rest, stability, creep, incipient slip."""
+"""Figures of sliding: bond stress over speed with closed forms, starts from rest, creep, the way to sliding."""
 
 import contextlib
 import re
@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sim.laws.incipient import Incipient
 from sim.plots import style
 from sim.plots.curves import (
     Scene,
@@ -21,7 +22,7 @@ from sim.plots.curves import (
     statement_curves,
 )
 from sim.plots.measured import Line, Measured
-from sim.read import Run, is_steady, setting, sweep_dims
+from sim.read import Run, control, is_steady, peaks_after_holds, setting, sweep_dims
 from sim.read.dataset import MEMBERS, stays_held, word
 from sim.read.events import incipient_law
 from sim.read.observables import with_slips
@@ -229,7 +230,8 @@ def exponent_of(force: np.ndarray, area: np.ndarray, top: int) -> float:
 def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     """Contact area over the tangential force before sliding, and the law A0 − αQ² if the loss grows as a square.
 
-    Law and exponent are fitted by least squares up to half of the largest force.
+    Law and exponent are fitted by least squares up to half of the largest force. If the scenario has the table
+    ``[incipient]``, its empirical law and the theory of a sticking contact under a load are drawn instead.
     """
     scene = scene_along(dataset, "t")
     force, area = np.abs(scene.all("spring_force")), scene.all("contact_area")
@@ -247,7 +249,12 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
         known.append(unit.factor * force_of)
         scale = factor if absolute else 1.0 / area_of[0]
         words = f"loss as $Q^{{{power:.2f}}}$"
-        if _SQUARE[0] <= power <= _SQUARE[1]:
+        stated = _stated_laws(dataset, line.point, area_of[0], force_of)
+        for look, name, areas in stated:
+            look = look | {"color": line.colour, "linewidth": 0.9}
+            panel.plot(known[-1], scale * areas, **look)
+            panel.plot([], [], **look | {"color": style.BOTH}, label=name)
+        if not stated and _SQUARE[0] <= power <= _SQUARE[1]:
             words += rf", $\alpha$ = {1e6 * alpha:.3g} mm$^2$/N$^2$"
             law = scale * (area_of[0] - alpha * force_of**2)
             look = {} if scene.single else {"color": line.colour}
@@ -259,6 +266,110 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     style.across(panel, forces, unit.label("tangential force $Q$"))
     style.legend(panel, scene.title)
     return figure
+
+
+def _stated_laws(
+    dataset: xr.Dataset, point: dict[str, int], area: float, force: np.ndarray
+) -> list[tuple[dict[str, Any], str, np.ndarray]]:
+    """Return look, name and areas [m^2] of the empirical law of a scenario, and of the theory beside it.
+
+    ``area`` [m^2] is that at rest. There are none without the table ``[incipient]``. The theory is that of full stick
+    at a load.
+    """
+    if "incipient_shrinkage" not in dataset:
+        return []
+    from sim.laws import theories  # heavy: for this figure alone
+
+    def number(key: str) -> float:
+        return float(setting(dataset, key).isel(point, missing_dims="ignore"))
+
+    keys = "shrinkage", "area", "exponent"
+    law = Incipient(**{key: number(f"incipient.{key}") for key in keys})
+    result: list[tuple[dict[str, Any], str, np.ndarray]] = [
+        (
+            {"linestyle": "--"},
+            r"empirical, $A_0 - \alpha Q^2$",
+            law.area_at(area, force),
+        )
+    ]
+    if control(dataset).kind == "load" and "solid_thickness" not in dataset:
+        modulus, ratio = (
+            float(dataset[name].isel(point, missing_dims="ignore"))
+            for name in ("contact_modulus", "effective_poisson_ratio")
+        )
+        work, size = number("adhesion.work"), number("sphere.radius")
+        radius = theories.savkoor_briggs_at_load(
+            number("contact.load"), work, force, size, modulus, ratio
+        )
+        look = {"linestyle": ":"}
+        result.append((look, "Savkoor and Briggs, full stick", np.pi * radius**2))
+    return result
+
+
+# -- peaks after holds ---------------------------------------------------------------------------
+
+
+def needs_holds(dataset: xr.Dataset) -> None:
+    """Refuse a dataset without friction peaks after holds of different times."""
+    each = peaks_after_holds(dataset)
+    if "time_held" not in each or np.unique(each["time_held"]).size < 3:
+        cure = '[drive] model = "holds" with holds = ["0.1 s", "1 s", "10 s"]'
+        raise ValueError(f"there are no holds of different times; set {cure}")
+    if each["peak_after_hold"].isnull().all():
+        raise ValueError(
+            "no friction peak follows a hold; make drive.slide longer, or the clock step shorter"
+        )
+
+
+def holds_figure(dataset: xr.Dataset) -> Figure:
+    """Friction peak after a hold over the time held, with its growth per decade or the time after which it saturates.
+
+    Bars are standard errors over the members.
+    """
+    run, scene = Run(dataset), scene_along(dataset, "t")
+    peak, held = (
+        run.events[f"phase_{name}"] for name in ("peak_after_hold", "time_held")
+    )
+    figure, (panel,) = style.rows([2.4])
+    factor = style.in_unit(
+        panel.yaxis, "friction peak after a hold $F_s$", np.ravel(peak.value), "N"
+    )
+    unit = style.Unit.of(np.ravel(held.value), "s", logarithmic=True)
+    for line in scene.lines:
+        peaks, errors, times = (
+            np.ravel(each.isel(line.point, missing_dims="ignore"))
+            for each in (
+                peak.value,
+                0.0 * peak.value + cast(xr.DataArray, peak.sem),
+                held.value,
+            )
+        )
+        order = np.argsort(times)[: np.isfinite(times).sum()]
+        x, y = unit.factor * times[order], factor * peaks[order]
+        words = _ageing_in_words(run, line)
+        label = ": ".join(filter(None, ["" if scene.single else line.label, words]))
+        look: Any = {"color": line.colour, "marker": "o", "markersize": 3.5}
+        panel.errorbar(x, y, factor * errors[order], label=label or None, **look)
+    reach = unit.factor * np.ravel(held.value)
+    style.across(panel, reach, unit.label("time held $t_h$"), "log", room=0.03)
+    panel.set_ylim(bottom=0.0)
+    style.legend(panel, scene.title)
+    return figure
+
+
+def _ageing_in_words(run: Run, line: Line) -> str:
+    """Return what the peaks after the holds at a point of the sweep say of ageing, "" if they say nothing."""
+    if "hold_growth" not in run.events:
+        return ""
+    growth, saturation = (
+        float(run.events[name].value.isel(line.point, missing_dims="ignore"))
+        for name in ("hold_growth", "hold_saturation")
+    )
+    if np.isfinite(growth):
+        return f"grows by {style.rounded(growth, 'N')} per decade"
+    if np.isfinite(saturation):
+        return f"saturates after {style.rounded(saturation, 's')}"
+    return ""
 
 
 # -- stress of the bonds ------------------------------------------------------------------------

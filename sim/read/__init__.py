@@ -32,7 +32,7 @@ from sim.read.observables import (
     share_observables,
 )
 from sim.read.over_speed import crossing, extremes, loss_speeds
-from sim.read.peaks import peaks, peaks_after_holds
+from sim.read.peaks import ageing, peaks, peaks_after_holds
 from sim.read.run import Run
 from sim.read.slips import kinetic_friction, slips, slips_by_phase, stick_slip
 from sim.read.statistics import QUANTILES, averaging, over_members, summary
@@ -60,6 +60,7 @@ __all__ = [
     "Run",
     "SystematicError",
     "Table",
+    "ageing",
     "averaging",
     "bond_work",
     "concise",

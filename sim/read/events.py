@@ -20,7 +20,13 @@ from sim.read.estimate import Estimate, Estimates, explained, of_every_member
 from sim.read.lifetimes import half_lives
 from sim.read.loops import mean_loops
 from sim.read.observables import defined
-from sim.read.peaks import ensemble_peaks, peaks, peaks_after_holds, static_threshold
+from sim.read.peaks import (
+    ageing,
+    ensemble_peaks,
+    peaks,
+    peaks_after_holds,
+    static_threshold,
+)
 from sim.read.slips import slips_by_phase, stick_slip
 from sim.read.statistics import summary
 
@@ -66,6 +72,7 @@ def events(dataset: xr.Dataset) -> Estimates:
         - ``slip_count``, ``static_friction``, ``kinetic_friction`` [N], ``slip_amplitude`` [m] and more, of a slider
           behind a spring, ``ran_away`` and ``runaway_after`` [s] of one under a force; see ``stick_slip``.
         - ``static_threshold`` [N] and ``area_at_threshold``, of a pull from rest; see ``static_threshold``.
+        - ``hold_growth`` [N] or ``hold_saturation`` [s], of sliding and holds in turn; see ``ageing``.
 
         Where only statistics were recorded, those of them that follow.
     """
@@ -88,7 +95,7 @@ def events(dataset: xr.Dataset) -> Estimates:
             reason = f"{QUANTITIES[name].absent} in every member"
             found[name] = of_every_member(found[name].value, reason)
     found |= _over_pull_offs(dataset)
-    for part in (peaks, stick_slip, static_threshold):
+    for part in (peaks, stick_slip, static_threshold, ageing):
         with where_recorded():
             found |= part(dataset)
     if "dissipated_energy" in dataset:

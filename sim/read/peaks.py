@@ -20,7 +20,7 @@ from sim.read.dataset import (
 )
 from sim.read.estimate import Estimate, Estimates
 from sim.read.late import observable_of
-from sim.read.observables import labelled, pure
+from sim.read.observables import defined, labelled, pure
 from sim.units.notation import engineering
 
 #: Relative changes below it are rounding.
@@ -261,6 +261,105 @@ def peaks_after_holds(dataset: xr.Dataset) -> xr.Dataset:
         }
     )
     return result.transpose(..., "phase")
+
+
+#: Decades of the time held from which on ageing is judged, and the share of the growth in the first of them above which
+#: peaks still grow in the last.
+_DECADES, _STILL_GROWS = 2.0, 0.1
+
+
+def ageing(dataset: xr.Dataset) -> Estimates:
+    """Return the growth of the peak after a hold over a decade of the time held, or the time after which it saturates.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive that slides and holds in turn.
+
+    Returns
+    -------
+    dict of str to Estimate
+        ``hold_growth`` [N] of each member, the slope of the peaks over the decimal logarithm of the time held by least
+        squares; ``hold_saturation`` [s], the shortest of the times held after which the mean peak grows by less than a
+        tenth of its growth in the first decade. Empty without peaks after holds over two decades or more.
+
+    Notes
+    -----
+    Peaks still grow if the last decade adds at least a tenth of what the first one adds. Then there is a slope, else a
+    saturation, never both. Both are nan if the first decade adds nothing, or if the members cannot tell: the growth in
+    the first decade, or its comparison with that in the last, is less than two standard errors.
+    """
+    each = peaks_after_holds(dataset)
+    if not {*each}:
+        return {}
+    peak, held = each["peak_after_hold"], each["time_held"]
+    if MEMBERS not in peak.dims:
+        peak = ensemble_mean(peak).expand_dims(MEMBERS)
+    result = xr.apply_ufunc(
+        _ageing,
+        peak,
+        held,
+        input_core_dims=[[MEMBERS, "phase"], ["phase"]],
+        output_core_dims=[[MEMBERS], [], []],
+        vectorize=True,
+    )
+    growth, saturation, decades = result
+    if not bool((decades >= _DECADES).any()):
+        return {}
+    if growth.sizes[MEMBERS] == 1:
+        growth = growth.isel({MEMBERS: 0})
+    return {
+        name: Estimate(defined(name, values))
+        for name, values in (("hold_growth", growth), ("hold_saturation", saturation))
+    }
+
+
+def _ageing(peaks: Array, held: Array) -> tuple[Array, float, float]:
+    """Return slopes over a decade (members,), the time of saturation, and the decades of the holds with a peak.
+
+    >>> held = np.array([0.1, 1.0, 10.0])
+    >>> slope, saturation, _ = _ageing(np.array([[8.18, 16.15, 16.20]]), held)
+    >>> print(slope, saturation)
+    [nan] 1.0
+    >>> slope, saturation, _ = _ageing(np.array([[1.0, 1.5, 2.0]]), held)
+    >>> print(slope.round(12), saturation)
+    [0.5] nan
+    """
+    none = np.full(len(peaks), np.nan)
+    known = np.isfinite(held) & np.isfinite(peaks).all(axis=0)
+    times, place = np.unique(held[known], return_inverse=True)
+    if times.size < 2:
+        return none, math.nan, 0.0
+    # holds of the same time count once
+    same = np.equal.outer(np.arange(times.size), place)
+    values = peaks[:, known] @ (same / same.sum(axis=1, keepdims=True)).T
+    logs = np.log10(times)
+    decades = float(logs[-1] - logs[0])
+    decades = round(decades, 9)
+    if decades < _DECADES:
+        return none, math.nan, decades
+    ends = logs[[0, 0, -1, -1]] + [0.0, 1.0, -1.0, 0.0]
+    weights = np.array([np.interp(ends, logs, unit) for unit in np.eye(times.size)])
+    at_ends = values @ weights
+    first, last = (at_ends[:, k + 1] - at_ends[:, k] for k in (0, 2))
+    excess = last - _STILL_GROWS * first
+    for growth in (first, excess):
+        error = (
+            float(growth.std(ddof=1)) / math.sqrt(len(growth))
+            if len(growth) > 1
+            else 0.0
+        )
+        if abs(growth.mean()) < _ALIKE * error:
+            return none, math.nan, decades
+    if not first.mean() > 0.0:
+        return none, math.nan, decades
+    if excess.mean() >= 0.0:
+        off = logs - logs.mean()
+        return values @ off / (off @ off), math.nan, decades
+    mean = values.mean(axis=0)
+    left = np.maximum.accumulate((mean[-1] - mean)[::-1])[::-1]
+    steady = times[np.argmax(left < _STILL_GROWS * first.mean())]
+    return none, float(steady), decades
 
 
 # --- peaks of the mean of members with noise, with errors, or the reason for none ---

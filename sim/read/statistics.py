@@ -17,8 +17,8 @@ FOR_TAILS = 20
 QUANTILES = (0.05, 0.5, 0.95)
 #: Observables that are 0 or 1 in each member: the interval of their mean is that of a share.
 _COUNTED = ("fraction_detached", "fraction_masked", "ever_detached")
-#: Forces below it are of rounding [N]: a bond bears a million million times as much.
-_NO_FORCE = 1e-24
+#: Forces and speeds below it are of rounding, by their units: a bond bears a million million times as much.
+_ROUNDING = {"N": 1e-24, "m/s": 1e-24}
 
 
 def averaging(dataset: xr.Dataset, late: bool) -> str:
@@ -56,8 +56,8 @@ def summary(observables: xr.Dataset, quantiles: bool = True) -> Estimates:
     result = {}
     for key, variable in observables.data_vars.items():
         name, values = str(key), variable.astype(float, copy=False)
-        if variable.attrs.get("units") == "N":
-            values = values.where(~(abs(values) < _NO_FORCE), 0.0)
+        if least := _ROUNDING.get(str(variable.attrs.get("units"))):
+            values = values.where(~(abs(values) < least), 0.0)
         values = values.assign_attrs(variable.attrs)
         if STATISTIC in values.dims:
             result[name] = _recorded(values, observables)

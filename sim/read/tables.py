@@ -157,6 +157,7 @@ EVENTS = (
     *_columns("peak_friction"),
     *_columns("peak_friction_speed", "peak_friction_time", dull=math.nan),
     *_columns("static_threshold", "area_at_threshold", dull=math.nan),
+    *_columns("hold_growth", "hold_saturation", dull=math.nan),
     *_columns("slip_count", "ran_away"),
     *_columns("onset_steady_speed", "onset_slip_speed", dull=math.nan),
     *_columns("end_slip_speed", "end_steady_speed", dull=math.nan),
@@ -299,8 +300,21 @@ def _of_losses_of(run: Run) -> tuple[Column, ...]:
 
 
 def phases(run: Run, rows: int = 12) -> Table:
-    """Return the slip events in each phase of the course of a stage, with a row for each phase."""
-    return _once(run, run.events, PHASES, rows, MOST)
+    """Return slip events and peaks in each phase of a course, with a row for each phase.
+
+    If there are several holds, phases without a hold before and without a slip event are left out.
+    """
+    stated = run.events
+    if "phase_time_held" in stated:
+        held = stated["phase_time_held"].value.notnull()
+        known = held.any([dim for dim in held.dims if dim != "phase"])
+        if known.sum() > 1:
+            names = [c.name for c in PHASES if c.name in stated]
+            if "phase_slip_count" in names:
+                slips = stated["phase_slip_count"].value > 0.0
+                known |= slips.any([dim for dim in slips.dims if dim != "phase"])
+            stated = {name: stated[name].isel({"phase": known}) for name in names}
+    return _once(run, stated, PHASES, rows, MOST)
 
 
 def spread(run: Run) -> Table:

@@ -19,6 +19,7 @@ from pydantic import (
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from sim.laws.incipient import Incipient
 from sim.numerics.grid import Lattice
 from sim.parts.bonds.models import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
@@ -260,6 +261,7 @@ class Scenario:
     instrument: Instrument | None = None
     zero: Zero | None = None
     temperature: Temperature | None = None
+    incipient: Incipient | None = None
     sweep: Annotated[tuple[Any, ...], BeforeValidator(read_sweep)] = ()
     name: _Title = "sliding contact"
     seed: Annotated[

@@ -1,6 +1,7 @@
 """Stepper of a driven slider, whose motion is solved together with bonds and contact in sub-steps."""
 
-from typing import ClassVar, cast
+import bisect
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -9,9 +10,17 @@ from sim.parts.contact.models import Equilibrium
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
 from sim.parts.coupled.step_end import StepEnds
-from sim.parts.drive import Driven as Slider
+from sim.parts.drive import Driven as Slider, Spring
 from sim.parts.events import Events
-from sim.parts.exchange import NO_DRAWS, Array, Bonding, ContactState, Motion, Storing
+from sim.parts.exchange import (
+    NO_DRAWS,
+    Array,
+    Bonding,
+    ContactState,
+    Drive,
+    Motion,
+    Storing,
+)
 from sim.parts.shear.models import Model as FluctuationModel
 from sim.spectrum.radial import PLANE
 from sim.step.state import MemberNoise, State, Trajectory
@@ -65,11 +74,18 @@ class Driven(Stepper):
     ) -> tuple[State, Trajectory]:
         scene = self.scene
         drive, _, process, _ = parts = scene.parts
+        slider = cast(Slider, state.drive)
+        if is_unloaded := self._is_unloaded(steps):
+            spring = cast(Spring, drive)
+            parts, slider = (
+                parts._replace(drive=cast(Drive[Any], spring.relaxed)),
+                spring.unloaded(slider),
+            )
         around = self._around(state.contact, state.shear, steps)
         ends = self._ends(state, noise, steps)
         reached = coupled.advance(
             parts,
-            state.drive,
+            slider,
             state.bonds,
             around,
             scene.times,
@@ -85,6 +101,8 @@ class Driven(Stepper):
         balance = scene.work.balance(bonding, energy, motions.position)
         touch = self._touch(state.contact, motions, balance, ends)
         sliders, bonding = coupled.with_contact(parts, reached, around, touch.radius)
+        if is_unloaded:  # the stage follows the slider
+            sliders = sliders._replace(stage_position=sliders.position)
         history = self._events(state, steps, motions, bonding, touch)
         history = self._with_slips(history, motions, sliders, bonding)
         end = State(
@@ -100,6 +118,13 @@ class Driven(Stepper):
         return end, Trajectory.of(
             motions.time, motions, bonding, energy, readings, touch
         )
+
+    def _is_unloaded(self, steps: range) -> bool:
+        """Return True if a block lies in a hold in which the stage has relaxed the spring."""
+        drive, phases = self.scene.parts.drive, self.scene.phases
+        if not (isinstance(drive, Spring) and drive.unloads):
+            return False
+        return phases.rests[bisect.bisect_right(phases.steps, steps.start) - 1]
 
     def _touch(
         self, before: ContactState, motions: Motion, balance: Balance, ends: StepEnds

@@ -240,7 +240,7 @@ class Fit(NamedTuple):
         stated = {
             key: float(x[0])
             for key, x in held.items()
-            if key not in ("t", "speed") and not np.ptp(x)
+            if key not in ("t", "speed", "tangential_force") and not np.ptp(x)
         }
         return stated | {
             item.free.name: item.value
@@ -326,7 +326,8 @@ def fit(
         problem = replace(problem, by_run=True).compared(problem.start)
     likelihood.refuse_undetermined(problem)
     problem, best = with_errors(problem)
-    steady, first = steady or problem.by_run, best
+    is_pulled = any("tangential_force" in table.conditions for table in tables)
+    steady, first = steady or problem.by_run or is_pulled, best
     converged = steady and best.converged
     for _ in range(0 if steady else _RUNS):
         before = best.x
@@ -731,12 +732,14 @@ def _along(table: Measured) -> Along:
         varied = {"t": table.conditions["t"]}
     if not varied:
         return Along("", "row", "1", np.arange(1.0, table.rows + 1.0))
-    key = max(varied, key=lambda key: (len({*_levels(varied[key])}), key == "speed"))
+    first = "speed", "tangential_force"
+    key = max(varied, key=lambda key: (len({*_levels(varied[key])}), key in first))
     column, unit, _ = MOUNT[table.mount]
     known = {
         "mount": (column.replace("_", " "), unit),
         "speed": ("sliding speed $V$", "m/s"),
         "t": ("time $t$", "s"),
+        "tangential_force": ("tangential force $Q$", "N"),
     }
     return Along(key, *known.get(key, (key, "1")), varied[key])
 

@@ -26,11 +26,14 @@ from scipy.stats import qmc
 from sim.ensemble.dataset import variable_name
 from sim.ensemble.steady import Values, history_at_rest, steady_course
 from sim.ensemble.variables import READ, VARIABLES
+from sim.laws import theories
+from sim.laws.incipient import Incipient
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Array
 from sim.quantities import QUANTITIES
 from sim.scenario.scenario import Clock, Scenario
 from sim.scenario.schema import changed, quantities
+from sim.step.state import Trajectory
 from sim.study.noise import FEWEST, Noise, noise_of
 from sim.units.errors import BadInput
 from sim.units.instrument import Instrument, Zero
@@ -67,15 +70,16 @@ class Curve(NamedTuple):
 
 
 #: Conditions that may change along the course of a contact; each value of another one is a scenario.
-COURSES = ("t", "speed", "mount")
+COURSES = ("t", "speed", "mount", "tangential_force")
 
 
 class Measured(NamedTuple):
     """One table: under which conditions which curves were measured.
 
-    ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement) and those of
-    other keys of the scenario. Rows have the same numbers in all columns. ``mount`` is the key of the contact that
-    holds the sphere. The first ``baseline`` rows were measured before the contact; ``noise`` is that of curves there.
+    ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement),
+    ``"tangential_force"`` and those of other keys of the scenario. Rows have the same numbers in all columns. ``mount``
+    is the key of the contact that holds the sphere. The first ``baseline`` rows were measured before the contact;
+    ``noise`` is that of curves there.
     """
 
     path: Path
@@ -138,7 +142,8 @@ def read(
         CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``: conditions,
         variables of a dataset, and beside these their standard errors, in the same dimension or in ``[%]``.
         Conditions are ``t``, ``speed``, the prescribed quantity of the mount (``normal_load``, ``indentation`` or
-        ``displacement``), or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``. A
+        ``displacement``), with the table ``[incipient]`` the ``tangential_force`` of a contact that does not slide yet,
+        or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``. A
         comment such as ``# solid.shear_modulus = 1 MPa`` states a condition of all rows. The speed of a slider behind a
         spring or under a force is no condition but a curve; ``stage_speed`` is that of a steady stage.
     scenario : Scenario
@@ -277,6 +282,8 @@ def faults_of(
     if not curves:
         yield 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
     drive, contact, known = scenario.drive, scenario.contact, quantities(scenario)
+    if "tangential_force" in conditions:
+        yield from _faults_of_pull(scenario, conditions, curves)
     steady = (
         {"drive.stage", "drive.force"} & known.keys()
         if drive.solves_motion
@@ -302,6 +309,19 @@ def faults_of(
             yield f"{name} needs the sign of the speed; change the sign of one of them"
         if errors is None and not np.any(values):
             yield f"{name} is 0 in all rows, so it has no scatter; give errors, or omit it"
+
+
+def _faults_of_pull(
+    scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curve, ...]
+) -> Iterator[str]:
+    """Yield the faults of a table of contacts under a tangential force that do not slide yet."""
+    if {"t", "speed"} & conditions.keys():
+        yield "tangential_force belongs to contacts that do not slide; omit t and speed"
+    elif not _at_rest(scenario) or scenario.contact.kind == "displacement":
+        cure = 'set [drive] model = "steady" with speed = 0, [shear] model = "uniform", and a load or an indentation'
+        yield f"tangential_force needs a contact at rest that is held; {cure}"
+    for name in (curve.name for curve in curves if curve.name not in _SIZES):
+        yield f"{name} does not follow from tangential_force; omit it, or measure contact_area"
 
 
 def _at_rest(scenario: Scenario) -> bool:
@@ -342,6 +362,11 @@ def conditions_of(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
         result["stage_speed"] = result["drive_stage"]
     if "temperature_value" in result:
         result["temperature"] = result["temperature_value"]
+    if scenario.incipient is not None:
+        result["tangential_force"] = (
+            "tangential_force",
+            Quantity("N", "tangential force before sliding", "Q"),
+        )
     column, unit, symbol = MOUNT[kind]
     mount = Quantity(unit, f"{column} of the sphere, contact.{kind}", symbol)
     result |= dict.fromkeys(names_of(column), ("mount", mount))
@@ -365,7 +390,8 @@ class Group(NamedTuple):
     ``scenario`` has them; ``rows`` are their places in the table, ``time`` [s] and ``speed`` [m/s] theirs, shape
     (rows, 1): the contact's course is one over ``time``. If ``has_mount``, the mount was measured at the rows. If
     ``has_history``, its course is a history, which the contact follows from the first row on. ``scale`` is the true
-    value of the mount over its reading.
+    value of the mount over its reading. ``force`` is the tangential force of contacts that do not slide [N], of the
+    shape of ``time``, None if they slide.
     """
 
     scenario: Scenario
@@ -376,6 +402,7 @@ class Group(NamedTuple):
     has_mount: bool
     has_history: bool
     scale: float = 1.0
+    force: Array | None = None
 
 
 def groups(scenario: Scenario, table: Measured) -> list[Group]:
@@ -412,6 +439,7 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
         speed = conditions.get(
             "speed", item.drive.pieces(instants, duration).joined.last[::2]
         )
+        force = conditions.get("tangential_force")
         result.append(
             Group(
                 scenario=item,
@@ -421,6 +449,7 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
                 elapsed=table.elapsed[rows],
                 has_mount=mount is not None,
                 has_history=table.has_history,
+                force=None if force is None else force[:, np.newaxis],
             )
         )
     return result
@@ -447,7 +476,10 @@ def by_steady_sliding(
         if group.has_history
         else steady_course(scenario, group.time, group.speed)
     )
-    if theory:
+    if group.force is not None:
+        radius = _pulled(scenario, course, group.force, values, theory)
+        course = course._replace(radius=radius)
+    elif theory:
         load, base, _ = scenario.contact.control(
             course.time, scenario.clock.duration
         ).mount
@@ -475,6 +507,48 @@ def by_steady_sliding(
     if zero is None:
         return result
     return {name: x + zero.at(name, group.elapsed) for name, x in result.items()}
+
+
+#: Theories of a contact under a tangential force that does not slide, each by the radius at a load and at an
+#: indentation; of mixed-mode fracture the mixity comes after the force.
+AT_FORCE: dict[str, tuple[Callable[..., Array], Callable[..., Array]]] = {
+    "savkoor_briggs": (
+        theories.savkoor_briggs_at_load,
+        theories.savkoor_briggs_at_indentation,
+    ),
+    "reversible_force": (
+        theories.reversible_force_at_load,
+        theories.reversible_force_at_indentation,
+    ),
+    "scaled_angle": (
+        theories.scaled_angle_at_load,
+        theories.scaled_angle_at_indentation,
+    ),
+    "shear_share": (theories.shear_share_at_load, theories.shear_share_at_indentation),
+    "scaled_tangent": (
+        theories.scaled_tangent_at_load,
+        theories.scaled_tangent_at_indentation,
+    ),
+}
+
+
+def _pulled(
+    scenario: Scenario, course: Trajectory, force: Array, values: Values, theory: str
+) -> Array:
+    """Return the radii of contacts at rest under a tangential force, by the empirical law or a theory [m]."""
+    at_rest = course.radius
+    if theory == "jkr":
+        return at_rest
+    if not theory:
+        law = cast(Incipient, scenario.incipient)
+        return np.asarray(np.sqrt(law.area_at(np.pi * at_rest**2, force) / np.pi))
+    load, base, _ = scenario.contact.control(course.time, scenario.clock.duration).mount
+    is_load = scenario.contact.kind == "load"
+    radius = AT_FORCE[theory][0 if is_load else 1]
+    own = [values["lambda"]] if "lambda" in values else []
+    held = load if is_load else base
+    rest = scenario.adhesion.work, *scenario.bodies.numbers
+    return radius(held, rest[0], force, *own, *rest[1:])
 
 
 def _at_true_mount(scenario: Scenario, off: ArrayLike, scale: float) -> Scenario:

@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
-from sim.study.likelihood import Free, Minimum, Problem, idle, minimum, spread
+from sim.study.likelihood import AT_FORCE, Free, Minimum, Problem, idle, minimum, spread
 from sim.units.errors import BadInput
 from sim.units.notation import chance
 from sim.units.quantity import Quantity
@@ -238,6 +238,13 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
 def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """Yield the mechanisms beside the scenario as it is, each with the keys that it has."""
     scene = problem.groups[0][0].scenario
+    if problem.groups[0][0].force is not None:
+        # the theories have no number of the empirical law
+        other = _less(problem, {}, "incipient.")
+        for theory in ("jkr", *AT_FORCE):
+            free = [*other.free, *filter(None, [_OWN.get(theory)])]
+            yield _THEORIES[theory], replace(other, free=free, theory=theory)
+        return
     still = dict.fromkeys({"shear.paid_by_adhesion"} & {*quantities(scene)}, 0.0)
     share = {"adhesion.bond_share": 0.0}
     shares = scene.adhesion.bond_share, scene.fluctuations.paid_by_adhesion

@@ -668,8 +668,45 @@ def _interpolated(times: Array, values: Array, row: Indices, time: Array) -> Arr
     )
 
 
+class Rows:
+    """Values at some times, linear between them; two rows at one time are a jump. A subclass gives ``_rows``."""
+
+    changes: ClassVar[bool] = True
+    cycles: ClassVar[int] = 0
+
+    @property
+    def _rows(self) -> tuple[Array, Array]:
+        """Times [s] and values."""
+        raise NotImplementedError
+
+    @property
+    def end(self) -> float:
+        """Return the last time for which the values are given [s]."""
+        raise NotImplementedError
+
+    @property
+    def extremes(self) -> tuple[float, ...]:
+        """Return values among which are the least and the largest of the run."""
+        return tuple(self._rows[1].tolist())
+
+    def at(self, time: Array, duration: float) -> Array:
+        times, values = self._rows
+        time = _snapped(times, time, duration)
+        return _interpolated(
+            times, values, np.searchsorted(times, time, "right") - 1, time
+        )
+
+    def jumps(self, time: Array, duration: float) -> Flags:
+        times, values = self._rows
+        is_jump = (np.diff(times) == 0.0) & (np.diff(values) != 0.0)
+        return np.isin(_snapped(times, time, duration), times[1:][is_jump])
+
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        return table_pieces(*self._rows, ends, duration)
+
+
 @keyed(kw_only=True)
-class Table:
+class Table(Rows):
     """Values tabulated over time, linear between the rows; two rows at one time are a jump.
 
     In a scenario file ``file`` names a CSV with the columns ``time`` and ``column``, each with its unit in brackets.
@@ -679,8 +716,6 @@ class Table:
     quantity: ClassVar[Quantity]
     column: ClassVar[str]
     values_in: ClassVar[str] = "value"
-    changes: ClassVar[bool] = True
-    cycles: ClassVar[int] = 0
 
     time: Annotated[tuple[Annotated[float, _TIME], ...], LISTED] = ()
     file: Annotated[
@@ -726,23 +761,50 @@ class Table:
     def end(self) -> float:
         return self.time[-1]
 
-    def at(self, time: Array, duration: float) -> Array:
-        times, values = self._rows
-        time = _snapped(times, time, duration)
-        return _interpolated(
-            times, values, np.searchsorted(times, time, "right") - 1, time
+
+_HOLD = Quantity("s", "time of a hold", "t_h", above=0)
+
+
+@keyed(kw_only=True)
+class Holds(Rows):
+    """Sliding at a speed and holds in turn; after the last hold the sliding does not end.
+
+    >>> course = Holds(speed=1e-3, slide=2.0, holds=(1.0, 10.0))
+    >>> course.at(np.array([1.0, 2.5, 4.0, 6.0, 20.0]), 20.0).tolist(), course.lasts
+    ([0.001, 0.0, 0.001, 0.0, 0.001], 17.0)
+    """
+
+    speed: Annotated[float, Quantity("m/s", "speed while sliding", "V")]
+    slide: Annotated[
+        float, Quantity("s", "time of sliding before each hold", "t_s", above=0)
+    ]
+    holds: Annotated[
+        tuple[Annotated[float, _HOLD], ...],
+        LISTED,
+        Field(description="times of the holds in turn", min_length=1),
+    ]
+    end: ClassVar[float] = math.inf  # type: ignore[misc]
+
+    @cached_property
+    def _rows(self) -> tuple[Array, Array]:  # type: ignore[override]
+        times = list(itertools.accumulate([0.0, self.slide]))
+        for hold in self.holds:
+            times += [times[-1], times[-1] + hold]
+            times += [times[-1], times[-1] + self.slide]
+        count = len(self.holds)
+        return np.array(times), self.speed * np.resize(
+            [1.0, 1.0, 0.0, 0.0], 4 * count + 2
         )
 
-    def jumps(self, time: Array, duration: float) -> Flags:
-        times, values = self._rows
-        is_jump = (np.diff(times) == 0.0) & (np.diff(values) != 0.0)
-        return np.isin(_snapped(times, time, duration), times[1:][is_jump])
-
-    def pieces(self, ends: Array, duration: float) -> Pieces:
-        return table_pieces(*self._rows, ends, duration)
+    @property
+    def lasts(self) -> float:
+        """Time from the start until the slider has slid after the last hold as after the others [s]."""
+        return float(self._rows[0][-1])
 
 
 def _kind(value: Any) -> str:
+    if isinstance(value, Holds) or (isinstance(value, dict) and "holds" in value):
+        return "[list of holds]"
     if isinstance(value, Table) or (
         isinstance(value, dict) and ("file" in value or "time" in value)
     ):
@@ -750,8 +812,11 @@ def _kind(value: Any) -> str:
     return "[course]" if isinstance(value, dict | Course) else "[value]"
 
 
-def over_time(unit: Quantity, name: str) -> Any:
-    """Return the annotation of a prescribed quantity: a number, a course, or a table whose column has this name."""
+def over_time(unit: Quantity, name: str, holds: type[Holds] | None = None) -> Any:
+    """Return the annotation of a prescribed quantity: a number, a course, or a table whose column has this name.
+
+    A speed may have ``holds``, too.
+    """
 
     @keyed(kw_only=True)
     class _Course(Course):
@@ -779,18 +844,19 @@ def over_time(unit: Quantity, name: str) -> Any:
         Annotated[float, unit, Tag("[value]")],
         Annotated[_Course, Tag("[course]")],
     )
-    return Annotated[
-        number | course | Annotated[_Table, Tag("[table]")], Discriminator(_kind)
-    ]
+    kinds = number | course | Annotated[_Table, Tag("[table]")]
+    if holds is not None:
+        kinds |= Annotated[holds, Tag("[list of holds]")]  # type: ignore[valid-type]
+    return Annotated[kinds, Discriminator(_kind)]
 
 
 #: A value prescribed over a run.
-Prescribed = Number | Course | Table
+Prescribed = Number | Course | Rows
 
 
-def prescribed(value: float | Course | Table) -> Prescribed:
+def prescribed(value: float | Course | Rows) -> Prescribed:
     """Return the course in time of a value of a scenario."""
-    return value if isinstance(value, Course | Table) else Number(value)
+    return value if isinstance(value, Course | Rows) else Number(value)
 
 
 # Tables of what was measured: CSV columns named as variables, with units, and beside them their errors.
