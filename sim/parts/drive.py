@@ -327,6 +327,8 @@ class _Driven(Part):
 
     #: Stiffness of the spring [N/m]; 0 where the force is prescribed.
     spring: ClassVar[float] = 0.0
+    #: True if the spring has no force while the stage holds.
+    unloads: ClassVar[bool] = False
 
     @property
     def at_once(self) -> bool:
@@ -477,7 +479,7 @@ class Spring(_Driven):
         return _too_few_holds(self.stage, self.start_after, setting)
 
     @property
-    def unloads(self) -> bool:
+    def unloads(self) -> bool:  # type: ignore[override]
         """True if the spring has no force while the stage holds."""
         return (
             isinstance(self.stage, StageHolds) and self.stage.while_held == "unloaded"

@@ -10,7 +10,7 @@ from sim.parts.contact.models import Equilibrium
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
 from sim.parts.coupled.step_end import StepEnds
-from sim.parts.drive import Driven as Slider, Spring
+from sim.parts.drive import Driven as Slider, Force, Spring
 from sim.parts.events import Events
 from sim.parts.exchange import (
     NO_DRAWS,
@@ -123,7 +123,7 @@ class Driven(Stepper):
     def _is_unloaded(self, steps: range) -> bool:
         """Return True if a block lies in a hold in which the stage has relaxed the spring."""
         drive, phases = self.scene.parts.drive, self.scene.phases
-        if not (isinstance(drive, Spring) and drive.unloads):
+        if not cast(Force | Spring, drive).unloads:
             return False
         return phases.rests[bisect.bisect_right(phases.steps, steps.start) - 1]
 

@@ -11,7 +11,7 @@ from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Cohesive, Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion, Solid, Sphere
-from sim.parts.drive import Force, Spring
+from sim.parts.drive import Force, Spring, StageHolds
 from sim.parts.exchange import Motion
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import (
@@ -47,6 +47,7 @@ DRIVES = {
     "linear ramp": drive.Ramp(start=-1e-3, stop=5e-3),
     "log ramp": drive.Ramp(start=1e-5, stop=1e-1, scale="log"),
     "table": drive.Table(time=(0.0, 0.003, 0.003, 0.02), speed=(1e-3, 1e-3, 2e-2, 0.0)),
+    "holds": drive.Holds(speed=4e-3, slide=2e-3, holds=(1e-3, 3e-3)),
     "spring": Spring(stage=2e-2, stiffness=100.0, start="steady"),
     "spring with mass": Spring(
         stage={"from": 1e-2, "to": -1e-2, "cycles": 1},
@@ -55,6 +56,12 @@ DRIVES = {
         mass=1e-4,
         damping=0.1,
         viscosity=1e5,
+        contact_stiffness="rigid",
+    ),
+    "spring with unloaded holds": Spring(
+        stage=StageHolds(speed=2e-2, slide=2e-3, holds=(2e-3,), while_held="unloaded"),
+        stiffness=100.0,
+        damping=0.1,
         contact_stiffness="rigid",
     ),
     "force": Force(

@@ -101,6 +101,13 @@ SCENES = {
         "clock": Clock(duration=0.1, step=2.5e-4),
         "sweep": LOADS,
     },
+    "holds": ALONE
+    | {
+        "bonds": bonds.Rate(critical_speed=1e-3, rebinding_rate=2.0, stress=2e5),
+        "drive": drive.Holds(speed=1e-2, slide=0.5, holds=(0.01, 0.1, 1.0)),
+        "clock": Clock(duration=3.12, step=2e-3),
+        "sweep": LOADS,
+    },
     "movie": {"ensemble": Ensemble(members=1)},
 }
 #: Further figures of these scenes.

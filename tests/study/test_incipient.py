@@ -111,6 +111,7 @@ def test_the_numbers_of_the_law_have_no_default_and_a_scene_without_it_no_column
 
 
 @pytest.mark.verify
+@pytest.mark.timeout(3600)
 def test_intervals_of_95_percent_hold_the_hidden_numbers_as_often_as_they_say():
     """Of 200 repetitions between 88 and 99.5 % hold: beyond four standard errors of a share of 95 %."""
     problem = sim.fit(SCENARIO, TABLE, FREE).problem
