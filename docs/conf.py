@@ -56,7 +56,10 @@ def setup(app: Any) -> None:
 
     def visit(as_block: bool) -> Any:
         def write(writer: Any, node: Any) -> None:
-            writer.body.append(tex2mathml(node.astext(), as_block=as_block))
+            formula = tex2mathml(node.astext(), as_block=as_block)
+            if as_block:  # a long one scrolls in a box, also by keys
+                formula = f'<div class="formula" tabindex="0">{formula}</div>'
+            writer.body.append(formula)
             raise nodes.SkipNode
 
         return write, None

@@ -702,6 +702,30 @@ def members() -> Drawing:
     return drawing
 
 
+def map_axes() -> Drawing:
+    """Return the rows of a file with a map of the stress, and the map under a moving contact."""
+    drawing = Drawing("Axes of a map of the shear stress", 250)
+    values = np.random.default_rng(3).standard_normal((5, 5))
+    values = 40.0 + 12.0 * (values + np.roll(values, 1, 1) + np.roll(values, 1, 0))
+    drawing.text((20, 30), "file", "title")
+    drawing.text((300, 30), "interface", "title")
+    drawing.box((20, 62), (200, 160), "fill-solid")
+    for i, j in np.ndindex(values.shape):
+        drawing.text((54 + 40 * j, 88 + 29 * i), f"{values[i, j]:.0f}", "small", "end")
+        share = min(max((values[i, j] - 10.0) / 70.0, 0.05), 1.0)
+        centre = (318.0 + 36.0 * j, 84.0 + 29.0 * i)
+        drawing.dot(centre, 13.0 * math.sqrt(share), "fill-flux")
+    for left in (20.0, 300.0):
+        drawing.arrow((left, 50), (left + 70, 50), "ink")
+        drawing.text((left + 76, 54), "x, sliding", "small")
+        drawing.arrow((left - 8, 62), (left - 8, 132), "ink")
+        drawing.text((left - 12, 148), "y", "small")
+    drawing.dot((372, 142), 42, "line bond thick")
+    drawing.text((400, 238), "contact", "small bond", "middle")
+    drawing.line([(388, 226), (380, 184)], "thin bond")
+    return drawing
+
+
 DRAWINGS: dict[str, Callable[[], Drawing]] = {
     "experiment": experiment,
     "energy_balance": energy_balance,
@@ -710,6 +734,7 @@ DRAWINGS: dict[str, Callable[[], Drawing]] = {
     "slip_cycle": slip_cycle,
     "thin_layer": thin_layer,
     "members": members,
+    "map_axes": map_axes,
 }
 
 

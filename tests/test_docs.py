@@ -312,7 +312,7 @@ APART = {"docs/dataset.md", "docs/design.md", "docs/theory.md"}
 #: Numbers that no command of their page prints, because the page states them: limits and defaults of the program,
 #: examples of the notation, exit codes, versions, years and measurements on several systems.
 STATED = {
-    "README.md": "3.11 133.2(10) 1.0 116.59 0.40",
+    "README.md": "2025 3.11 133.2(10) 1.0 116.59 0.40",
     "docs/choosing.md": "24 55 64 1000 50,000 95 97.5",
     "docs/explore.md": "50 95",
     "docs/fit.md": "250 1.5 10,000 30 45 512 1,000 94.8 95.5",
