@@ -726,6 +726,46 @@ def map_axes() -> Drawing:
     return drawing
 
 
+def loads() -> Drawing:
+    """Return the area over the speed at three loads, and the friction coefficient over the load."""
+    drawing = Drawing("Contact area and friction coefficient at several loads", 530)
+    starter = ROOT / "sim" / "starter.toml"
+    one = {"shear.model": "mean", "ensemble.members": 1}
+    top = Panel(drawing, (64, 46), (420, 170), (0.01, 100), (0.4, 1.02), (True, False))
+    looks = {"1 mN": "bond", "4 mN": "ink", "16 mN": "flux"}
+    for k, (load, look) in enumerate(looks.items()):
+        dataset = sim.run(sim.load(starter, {**one, "contact.load": load}))
+        every = dataset.squeeze()
+        share = (every.contact_area / every.jkr_radius**2 / math.pi).values
+        top.curve(1e3 * every.speed.values, share, f"{look} thick")
+        drawing.text((84, 120 + 18 * k), load, look)
+    top.frame(
+        ("sliding speed (mm/s)", "contact area, over that at rest"),
+        (
+            {0.01: "0.01", 0.1: "0.1", 1: "1", 10: "10", 100: "100"},
+            {0.4: "0.4", 0.6: "0.6", 0.8: "0.8", 1.0: "1"},
+        ),
+    )
+    bottom = Panel(drawing, (64, 310), (420, 160), (0.5, 32), (0, 12), (True, False))
+    steady = {**one, "drive": {"model": "steady", "speed": "1 mm/s"}}
+    values = np.geomspace(0.5, 32.0, 13)  # mN; every second is a power of two
+    sweep = {"sweep": {"contact.load": [f"{value:.6g} mN" for value in values]}}
+    dataset = sim.run(sim.load(starter, {**steady, **sweep})).isel(t=-1).squeeze()
+    coefficient = (dataset.friction_force / dataset.normal_load).values
+    bottom.curve(values, coefficient, "ink thick")
+    for load, look in zip((1.0, 4.0, 16.0), looks.values(), strict=True):
+        at = float(np.interp(math.log(load), np.log(values), coefficient))
+        drawing.dot(bottom.at(load, at), 5, f"fill-{look}")
+    bottom.frame(
+        ("load (mN)", "friction coefficient at 1 mm/s"),
+        (
+            {1: "1", 4: "4", 16: "16"},
+            {0: "0", 5: "5", 10: "10"},
+        ),
+    )
+    return drawing
+
+
 DRAWINGS: dict[str, Callable[[], Drawing]] = {
     "experiment": experiment,
     "energy_balance": energy_balance,
@@ -735,6 +775,7 @@ DRAWINGS: dict[str, Callable[[], Drawing]] = {
     "thin_layer": thin_layer,
     "members": members,
     "map_axes": map_axes,
+    "loads": loads,
 }
 
 
