@@ -554,7 +554,7 @@ def slip_cycle() -> Drawing:
     drawing.arrow((arrow, top.at(0, high)[1]), (arrow, top.at(0, low)[1] - 1), "flux")
     drawing.text((arrow + 6, top.at(0, 0.75 * high)[1]), "force drop", "small flux")
     drawing.text(
-        top.at(events[1] + 0.56 * period, 0.22 * high), "stick phase", "small bond"
+        top.at(events[1] + 0.46 * period, 0.14 * high), "stick phase", "small bond"
     )
     drawing.text((arrow + 8, top.at(0, low)[1] - 4), "after the event", "small")
     ticks = {t: f"{t:g}" for t in np.arange(0, stop - begin, 100.0).tolist()}
