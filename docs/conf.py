@@ -1,9 +1,11 @@
 """Configuration of the documentation site: ``make docs``."""
 
+from html import escape
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
-from docutils.nodes import SkipNode
+from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
 
 project, author, project_copyright = (
@@ -22,12 +24,12 @@ extensions = [
     "sphinx_copybutton",
 ]
 exclude_patterns, templates_path = ["_build", "_templates"], ["_templates"]
-html_theme, html_title = "furo", "sliding-sim"
+html_theme, html_title = "furo", f"sliding-sim {release}"
 html_static_path, html_css_files = ["_static"], ["site.css"]
 html_math_renderer = "mathml"
 
 # Markdown as code hosts show it: formulas between dollars or in fenced blocks, anchors of headings
-myst_enable_extensions = ["dollarmath", "html_image"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "html_image"]
 myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
 nb_execution_mode = "off"  # outputs are stored, and a test executes the notebook
@@ -40,19 +42,54 @@ numpydoc_show_class_members = False
 copybutton_prompt_text, copybutton_prompt_is_regexp = r">>> |\.\.\. ", True
 smartquotes = False  # two dashes of an option stay two dashes
 
+#: Pages of the site that are files of the folder above, each with its name here.
+ABOVE = {
+    "changelog": "CHANGELOG.md",
+    "contributing": "CONTRIBUTING.md",
+    "security": "SECURITY.md",
+    "conduct": "CODE_OF_CONDUCT.md",
+}
+
 
 def setup(app: Any) -> None:
     """Write formulas as MathML, because browsers show it without a script from the network."""
 
     def visit(as_block: bool) -> Any:
         def write(writer: Any, node: Any) -> None:
-            writer.body.append(tex2mathml(node.astext(), as_block=as_block))
-            raise SkipNode
+            formula = tex2mathml(node.astext(), as_block=as_block)
+            if as_block:  # a long one scrolls in a box, also by keys
+                formula = f'<div class="formula" tabindex="0">{formula}</div>'
+            writer.body.append(formula)
+            raise nodes.SkipNode
 
         return write, None
 
     app.add_html_math_renderer("mathml", visit(False), visit(True))
     app.connect("sphinx-click-process-epilog", _add_kinds)
+    app.connect("doctree-resolved", _put_drawings_into_the_page)
+    app.connect("source-read", _read_files_above)
+
+
+def _read_files_above(app: Any, page: str, source: list[str]) -> None:
+    """Show a file of the folder above as a page, with links that lead to pages of the site."""
+    if page in ABOVE:
+        path = Path(app.srcdir).parent / ABOVE[page]
+        app.env.note_dependency(str(path))
+        text = path.read_text(encoding="utf-8").replace("](docs/", "](")
+        for name, file in ABOVE.items():
+            text = text.replace(f"]({file}", f"]({name}.md")
+        source[0] = text
+
+
+def _put_drawings_into_the_page(app: Any, doctree: nodes.document, page: str) -> None:
+    """Replace the images of docs/drawings by the drawings themselves, whose colours then follow the page."""
+    for image in list(doctree.findall(nodes.image)):
+        if image["uri"].startswith("drawings/"):
+            drawing = (Path(app.srcdir) / image["uri"]).read_text(encoding="utf-8")
+            label = f'aria-label="{escape(image["alt"])}" role="img"'
+            image.replace_self(
+                nodes.raw("", drawing.replace('role="img"', label, 1), format="html")
+            )
 
 
 def _add_kinds(app: Any, context: Any, lines: list[str]) -> None:

@@ -27,6 +27,8 @@ contact.load = "4 mN"
 
 Made by `python docs/make_keys.py` from the declarations in the code.
 """
+#: A key with more words refers to the page that has them, because a cell would be a screen high.
+MOST_WORDS = 30
 #: Keys of the file itself that stand before its tables.
 _FIRST = ("name", "seed")
 
@@ -99,7 +101,10 @@ def _row(key: str, field: typing.Any, titles: list[str]) -> tuple[str, str, str]
         return "", f"the table {place}", default
     meaning = quantity.meaning if quantity else field.description
     words = _words(field.annotation)
-    meaning += f": {', '.join(words)}" if words else ""
+    if len(words) > MOST_WORDS:
+        meaning += "; each variable of [a dataset](dataset.md) has its name there"
+    elif words:
+        meaning += f": {', '.join(words)}"
     meaning += f"; or the table {place}" if inner else ""
     return (
         ("" if quantity is None or quantity.whole else quantity.unit),
