@@ -191,15 +191,57 @@ def bytes_of(name: str) -> bytearray:
                     )
                     == size
                 ):
-                    return content
+                    return with_checksum(content)
     raise RuntimeError("HDF5 does not give the bytes of a dataset in memory")
+
+
+def lookup3(key: bytes) -> int:
+    """Return the hash of some bytes by which HDF5 checks its metadata.
+
+    It is ``hashlittle`` of R. Jenkins' lookup3.c (2006, public domain) with a start of 0, named in the specification of
+    the file format of HDF5.
+    """
+    most = 2**32 - 1
+
+    def turned(word: int, bits: int) -> int:
+        return (word << bits | word >> 32 - bits) & most
+
+    a = b = c = (0xDEADBEEF + len(key)) & most
+    for first in range(0, len(key), 12):
+        block = key[first : first + 12].ljust(12, b"\0")
+        words = (int.from_bytes(block[k : k + 4], "little") for k in (0, 4, 8))
+        a, b, c = (
+            (old + new) & most for old, new in zip((a, b, c), words, strict=True)
+        )
+        if first + 12 < len(key):
+            for bits in (4, 6, 8, 16, 19, 4):
+                a = (a - c & most) ^ turned(c, bits)
+                a, b, c = b, c + b & most, a
+        else:
+            for bits in (14, 11, 25, 16, 4, 14, 24):
+                c = (c ^ b) - turned(b, bits) & most
+                a, b, c = b, c, a
+            # after seven turns of three words the last result is the second
+            c = b
+    return c
+
+
+def with_checksum(content: bytearray) -> bytearray:
+    """Return the bytes of a file of HDF5 with the checksum of its first 44 bytes, the superblock.
+
+    Some releases of HDF5 1.14 mark the file as closed in the bytes that they give, and leave the checksum of an open
+    file, so that no program would read them.
+    """
+    if content[8] in (2, 3):  # versions of the superblock with a checksum
+        content[44:48] = lookup3(bytes(content[:44])).to_bytes(4, "little")
+    return content
 
 
 def write_in_memory(path: Path, fill: Callable[[File], None]) -> None:
     """Build a netCDF file in memory, and write its bytes as those of any other file.
 
-    HDF5 gives no reason if the disk fails, and netCDF crashes if that happens while it closes a file. HDF5 1.14 gives
-    bytes that it cannot read itself: then closing the file writes it.
+    HDF5 gives no reason if the disk fails, and netCDF crashes if that happens while it closes a file. So closing the
+    file writes it only if HDF5 gives no bytes, or bytes that it cannot read.
     """
     content = _image(path, fill) if hdf5_gives_bytes() else None
     if content is not None:
