@@ -79,4 +79,4 @@ class Incipient:
             A [m^2].
         """
         lost = self.shrinkage_at(area_at_rest) * np.square(force)
-        return np.asarray(np.maximum(area_at_rest - lost, 0.0))
+        return np.asarray(np.maximum(np.asarray(area_at_rest) - lost, 0.0))

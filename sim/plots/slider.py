@@ -338,7 +338,7 @@ def holds_figure(dataset: xr.Dataset) -> Figure:
     for line in scene.lines:
         peaks, errors, times = (
             np.ravel(each.isel(line.point, missing_dims="ignore"))
-            for each in (peak.value, 0.0 * peak.value + peak.sem, held.value)
+            for each in (peak.value, 0.0 * peak.value + cast(Any, peak.sem), held.value)
         )
         order = np.argsort(times)[: np.isfinite(times).sum()]
         x, y = unit.factor * times[order], factor * peaks[order]
