@@ -670,13 +670,13 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
     """The loss of area grows about as the square of the tangential force, as measured on many contacts. The
     loss grows faster when sliding begins. At the largest tangential force, {small:.1f} % of the area are lost under
     a load of {least:g} mN, {large:.1f} % under {load:g} mN; measured contacts lose one to three tenths. The
-    coefficient α of the square scales with the area at rest to the power {power:.2f}; measured contacts have about minus
-    three halves (dashed: this empirical law, its size taken from the middle contact). Which mechanisms can make such a loss at
-    these loads? Broken bonds can, and they alone do it here. They cannot take more than {most:.0f} % under
-    {least:g} mN and {fewest:.0f} % under {load:g} mN, which leaves Hertz's area. Fluctuations of the stress have the
-    same limits, and this scenario has none. A uniform stress takes nothing, unless adhesion pays for a share of its
-    energy (`contact.reversible`). The theory of full stick (dotted) takes all of adhesion at {limit:.1f} mN under
-    {least:g} mN, at {share:.0f} % of the force at which this contact begins to slide.""",
+    coefficient α of the square scales with the area at rest to the power {power:.2f}; measured contacts have about
+    minus three halves (dashed: this empirical law, its size taken from the middle contact). Which mechanisms can
+    make such a loss at these loads? Broken bonds can, and they alone do it here. They cannot take more than
+    {most:.0f} % under {least:g} mN and {fewest:.0f} % under {load:g} mN, which leaves Hertz's area. Fluctuations of
+    the stress have the same limits, and this scenario has none. A uniform stress takes nothing, unless adhesion
+    pays for a share of its energy (`contact.reversible`). The theory of full stick (dotted) takes all of adhesion
+    at {limit:.1f} mN under {least:g} mN, at {share:.0f} % of the force at which this contact begins to slide.""",
     kind="incipient",
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
