@@ -669,8 +669,8 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
     "How does the contact area fall before sliding begins?",
     """The loss of area grows about as the square of the tangential force, as measured on many contacts. The
     loss grows faster when sliding begins. At the largest tangential force, {small:.1f} % of the area are lost under
-    a load of {least:g} mN, {large:.1f} % under {load:g} mN; measured contacts lose 10 to 30 %. The coefficient α of
-    the square scales with the area at rest to the power {power:.2f}; measured contacts have about minus three halves
+    a load of {least:g} mN, {large:.1f} % under {load:g} mN; measured contacts lose ten to thirty per cent. The
+    coefficient α of the square scales with the area at rest to the power {power:.2f}; measured contacts have about minus three halves
     (dashed: this empirical law, its size taken from the middle contact). Which mechanisms can make such a loss at
     these loads? Broken bonds can, and they alone do it here. They cannot take more than {most:.0f} % under
     {least:g} mN and {fewest:.0f} % under {load:g} mN, which leaves Hertz's area. Fluctuations of the stress have the
@@ -716,14 +716,19 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
     "incipient_fit",
     "How does the loss of area before sliding depend on the size of the contact?",
     """In this made-up table the area falls as A₀ − αQ², and α falls with the area at rest to the power {exponent}.
-    At 0.3 mm² the coefficient α is {shrinkage} mm²/N². The table was made with 3/2 and 200 mm²/N². The law is
-    empirical, so that the fit says nothing of its cause. `--compare` fits theories of a sticking contact to the same
-    points. Here each of them is rejected: it predicts much more loss, or a loss that depends otherwise on the size.""",
+    At {area:g} mm² the coefficient α is {shrinkage} mm²/N². The table was made with {power:g} and {made:g} mm²/N².
+    The law is empirical, so that the fit says nothing of its cause. `--compare` fits theories of a sticking contact to
+    the same points. Here each of them is rejected: it predicts much more loss,
+    or a loss that depends otherwise on the size.""",
     free=("incipient.shrinkage", "incipient.exponent"),
 )
 def incipient_fit(result: Fit) -> dict[str, Number]:
     shrinkage, exponent = result.numbers
+    law = result.scenario.incipient
     return {
+        "area": 1e6 * law.area,
+        "power": 1.5,
+        "made": 200.0,
         "shrinkage": (1e6 * shrinkage.value, 1e6 * shrinkage.error),
         "exponent": (exponent.value, exponent.error),
     }

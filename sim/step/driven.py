@@ -1,7 +1,7 @@
 """Stepper of a driven slider, whose motion is solved together with bonds and contact in sub-steps."""
 
 import bisect
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -70,7 +70,7 @@ class Driven(Stepper):
         if is_unloaded := self._is_unloaded(steps):
             spring = cast(Spring, drive)
             parts, slider = (
-                parts._replace(drive=cast(Any, spring.relaxed)),
+                parts._replace(drive=spring.relaxed),  # type: ignore[arg-type]
                 spring.unloaded(slider),
             )
         around = self._around(state.contact, state.shear, steps)
