@@ -313,7 +313,7 @@ class UnderCircle(_Searched, HalfSpace):
     >>> mounts = (0.0, 0.16, math.inf), (0.0, 0.4 * math.atanh(0.4), math.inf)
     >>> solids = HalfSpace(1.0), UnderCircle(1.0)
     >>> print(*(f"{solid.load(0.4, mount, 1.0):.4f}" for solid, mount in zip(solids, mounts)))
-    0.3413 0.3658
+    0.3413 0.3657
     """
 
     thickness: float = equilibrium.CIRCLE
