@@ -27,6 +27,7 @@ exclude_patterns, templates_path = ["_build", "_templates"], ["_templates"]
 html_theme, html_title = "furo", f"sliding-sim {release}"
 html_static_path, html_css_files = ["_static"], ["site.css"]
 html_math_renderer = "mathml"
+html_theme_options: dict[str, Any] = {"top_of_page_buttons": []}
 
 # Markdown as code hosts show it: formulas between dollars or in fenced blocks, anchors of headings
 myst_enable_extensions = ["colon_fence", "dollarmath", "html_image"]
@@ -68,6 +69,27 @@ def setup(app: Any) -> None:
     app.connect("sphinx-click-process-epilog", _add_kinds)
     app.connect("doctree-resolved", _put_drawings_into_the_page)
     app.connect("source-read", _read_files_above)
+    app.connect("build-finished", _complete_landmarks)
+
+
+#: Parts of the theme's pages, each with what a screen reader or a keyboard needs.
+COMPLETED = {
+    '<p class="caption" role="heading">': '<p class="caption" role="heading" aria-level="2">',
+    '<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="Pages">',
+    '<aside class="toc-drawer': '<aside aria-label="On this page" class="toc-drawer',
+    '<div class="table-wrapper': '<div tabindex="0" class="table-wrapper',
+    "<pre>": '<pre tabindex="0">',
+}
+
+
+def _complete_landmarks(app: Any, error: Exception | None) -> None:
+    """Name the regions of each page, and let the keyboard scroll tables and code."""
+    for page in Path(app.outdir).rglob("*.html") if error is None else ():
+        text = before = page.read_text(encoding="utf-8")
+        for part, complete in COMPLETED.items():
+            text = text.replace(part, complete)
+        if text != before:
+            page.write_text(text, encoding="utf-8")
 
 
 def _read_files_above(app: Any, page: str, source: list[str]) -> None:
