@@ -267,8 +267,8 @@ def _off_the_map(scene: Scene) -> Faults:
 
 #: Rms of the fluctuations over the mean stress above which a remark is made: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5
-#: Strain, and radius over that of the sphere, above which a remark is made; the same of γ/E over the contact radius.
-LARGEST_STRAIN, LARGEST_CAPILLARITY = 0.3, 0.1
+#: Radius over that of the sphere, shear strain, and γ/E over the contact radius, above each of which a remark is made.
+LARGEST_SLOPE, LARGEST_STRAIN, LARGEST_CAPILLARITY = 0.3, 0.1, 0.1
 #: Contact radius over the thickness of a layer above which a remark is made on its compressibility.
 _COMPRESSED = 10.0
 #: Surface tension of water, and so of a wet gel [N/m].
@@ -347,15 +347,18 @@ def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
             f"the Tabor number is {known.tabor[0]:.2g} for z0 = {near} and {known.tabor[1]:.2g} for z0 = {far}:"
             f' JKR\'s theory holds above about {JKR_FROM:g}; contact.model = "cohesive" has a range of adhesion'
         )
-    if known.slope > LARGEST_STRAIN:
+    if known.slope > LARGEST_SLOPE:
         cure = 'sphere.profile = "circle" has no error of the profile'
         is_circle = scene.sphere.profile == "circle" or math.isnan(known.parabola)
         yield (
-            f"the contact radius reaches {known.slope:.2g} of the sphere's, beyond {LARGEST_STRAIN}: the theory is"
+            f"the contact radius reaches {known.slope:.2g} of the sphere's, beyond {LARGEST_SLOPE}: the theory is"
             f" valid for small contacts{'' if is_circle else f'; {cure}'}"
         )
     if known.strain > LARGEST_STRAIN:
-        yield f"the mean stress is {known.strain:.2g} times the shear modulus, beyond linear elasticity"
+        yield (
+            f"the mean stress is {known.strain:.2g} times the shear modulus: finite strains, which are left out, reduce"
+            f" the area from about {LARGEST_STRAIN} on"
+        )
     thickness = scene.solid.thickness
     if thickness is not None and scene.widest > _COMPRESSED * thickness:
         yield (
