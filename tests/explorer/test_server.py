@@ -98,7 +98,9 @@ def test_the_page_gets_its_files_and_its_answers(server, token):
         assert status == 200 and word in body and token.encode() not in body
     assert asked(server, token, "/start")["title"] == "a scene"
     assert asked(server, token)["level"]["words"].startswith("10 % lost at")
-    assert asked(server, token, "/words")["remarks"] == []
+    (remark,) = asked(server, token, "/words")["remarks"]
+    # 0.3 MPa over 1 + 1/10 and 1.6 MPa
+    assert remark.startswith("the mean stress is 0.17 times the shear modulus")
     assert asked(server, token, "/contact", speed=1e-3)["radius"] > 1e-4
     assert asked(server, token, "/band")["along"] == "speed"
     assert asked(server, token, values={"sphere.radius": "3 kg"})["faults"][
