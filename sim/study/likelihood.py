@@ -1022,6 +1022,11 @@ def spread_by_sum(problem: Problem) -> Array:
     return places[np.argsort([_sum(problem, place) for place in places], kind="stable")]
 
 
+def tried_once(problem: Problem) -> Callable[[], Array]:
+    """Return a function that returns the places of ``spread_by_sum``, which it finds when they are first needed."""
+    return functools.cache(functools.partial(spread_by_sum, problem))
+
+
 def with_errors(
     problem: Problem, start: Array | None = None
 ) -> tuple[Problem, Minimum]:
@@ -1118,9 +1123,14 @@ class Interval(NamedTuple):
     high_open: bool
 
 
-def interval(problem: Problem, best: Minimum, k: int) -> Interval:
-    """Return the 95 % interval of a free number."""
-    return profile(problem, best, problem.free[k], np.eye(len(best.x))[k])
+def interval(
+    problem: Problem,
+    best: Minimum,
+    k: int,
+    places: Callable[[], Array] | None = None,
+) -> Interval:
+    """Return the 95 % interval of a free number; ``places`` as of ``profile``."""
+    return profile(problem, best, problem.free[k], np.eye(len(best.x))[k], places)
 
 
 def profile(
@@ -1128,12 +1138,13 @@ def profile(
     best: Minimum,
     item: Free,
     weights: Array,
-    places: Array | None = None,
+    places: Callable[[], Array] | None = None,
 ) -> Interval:
     """Return the interval in which the sum of squares, least over all else, stays below its bound (profile likelihood).
 
     If values beyond an end are not rejected either, because another explanation of the data holds there, the interval
-    reaches to the last of them. Such values are searched if the sum of squares is no parabola up to the end.
+    reaches to the last of them. Such values are searched if the sum of squares is no parabola up to the end, except if
+    each prediction is a run or follows a history, because that would take too long.
 
     Parameters
     ----------
@@ -1143,14 +1154,10 @@ def profile(
         The quantity, with its bounds.
     weights : array
         Weights of all that is free, as it is fitted, in the quantity, as it is fitted.
-    places : array, shape (places, free), optional
-        Those of ``spread_by_sum``, from which other explanations are searched; not if each prediction is a run or
-        follows a history, because that would take too long.
+    places : callable, optional
+        ``tried_once`` of the problem, which several intervals share.
     """
-    if problem.is_rough:
-        places = best.x[np.newaxis, :][:0]
-    elif places is None:
-        places = spread_by_sum(problem)
+    places = places or tried_once(problem)
     rise = math.sqrt(
         stats.f.ppf(LEVEL, 1, problem.freedom)
         if problem.estimated.any()
@@ -1231,7 +1238,7 @@ def _end(
     weights: Array,
     bound: float,
     rise: float,
-    places: Array,
+    places: Callable[[], Array],
 ) -> tuple[float, bool]:
     """Return the end of an interval on the side of a bound, and True if the bound itself is the end."""
     value, start = float(weights @ best.x), best.x
@@ -1247,9 +1254,10 @@ def _end(
         if abs(bound - end) < precision:
             return bound, True
         # a sum of squares that is a parabola has one minimum
-        if 1.0 / _PARABOLIC < abs(end - value) / (rise * spread) < _PARABOLIC:
+        of_parabola = abs(end - value) / (rise * spread)
+        if problem.is_rough or 1.0 / _PARABOLIC < of_parabola < _PARABOLIC:
             break
-        beyond = _beyond(problem, weights, bound, end, places, spread)
+        beyond = _beyond(problem, weights, bound, end, places(), spread)
         further = (float(weights @ beyond.x) - end) * math.copysign(1.0, bound - value)
         is_rejected = beyond.chi_square >= best.chi_square + rise**2
         if is_rejected or further < precision:
@@ -1284,8 +1292,7 @@ def _beyond(
 
     kept = replace(problem, spring=spring)
     minima = [minimum(kept, place, _COARSE) for place in (*beyond, *moved)]
-    nothing = Minimum(np.full(len(weights), np.nan), math.inf, np.empty((0, 0)), False)
-    return min(minima, key=lambda item: item.chi_square, default=nothing)
+    return min(minima, key=lambda item: item.chi_square)
 
 
 def _walk(

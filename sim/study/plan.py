@@ -13,7 +13,7 @@ are left out. The likelihood ratio of a mechanism has the distribution of the da
 import itertools
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -318,9 +318,9 @@ def plan(
     with progress_bar(count, "steps of the plan") as shown:
         first = design.simulated(sims, seed)
         shown.advance(1)
-        expected = list[Expected]()
+        expected, tried = list[Expected](), likelihood.tried_once(problem)
         for k in range(len(numbers)):
-            expected.append(_interval(problem, k, first.values, first.sums))
+            expected.append(_interval(problem, k, first, tried))
             shown.advance(1)
         ranked = list[tuple[Point, _Design]]()
         for row in further:
@@ -447,17 +447,20 @@ def _words(scenario: Scenario, table: Measured, row: Measured) -> str:
     return (", ".join(texts) or "the same conditions") + variables
 
 
-def _interval(problem: Problem, k: int, values: Array, sums: Array) -> Expected:
-    """Return the interval to expect for a free number, by simulated values and their least sums of squares."""
+def _interval(
+    problem: Problem, k: int, simulated: _Simulated, tried: Callable[[], Array]
+) -> Expected:
+    """Return the interval to expect for a free number, by the simulated data sets; ``tried`` as of ``profile``."""
     item, covariance = problem.free[k], likelihood.covariance_at(problem, problem.start)
     exact = Minimum(problem.start, 0.0, covariance, True)
-    levels = sums + float(stats.chi2.ppf(LEVEL, 1))
+    levels = simulated.sums + float(stats.chi2.ppf(LEVEL, 1))
     rest, chances = [*problem.free[:k], *problem.free[k + 1 :]], list[Chance]()
     for end in (item.low, item.high):
         held = replace(problem, free=rest, fixed={**problem.fixed, item.key: end})
         search = Search(held, [held.start])
-        chances.append(Chance.of(np.array([*map(search.reaches, values, levels)])))
-    return Expected(item, likelihood.interval(problem, exact, k), *chances)
+        reached = [*map(search.reaches, simulated.values, levels)]
+        chances.append(Chance.of(np.array(reached)))
+    return Expected(item, likelihood.interval(problem, exact, k, tried), *chances)
 
 
 def figure(result: Plan) -> Figure:
