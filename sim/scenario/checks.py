@@ -331,7 +331,7 @@ def _of_parabola(scene: Scene) -> float:
         scene.contact.largest_radius(
             scene.adhesion.work,
             scene.bodies._replace(
-                solid=replace(scene.sphere, profile=profile).on(scene.solid.elastic)
+                solid=replace(scene.sphere, profile=profile).on(scene.elastic)
             ),
         )
         for profile in ("parabola", "circle")

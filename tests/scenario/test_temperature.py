@@ -154,6 +154,7 @@ def test_a_scene_at_a_temperature_is_bit_for_bit_the_plain_scene_with_its_number
             key == "bonds.rupture.bell_force" and "bell_force" in laws
         )
         assert recorded is None or float(recorded) == value
+    np.testing.assert_equal(scene.limits._asdict(), plain.limits._asdict())
     # a twin with other numbers differs, and a scene without a temperature has no such columns
     cold = sim.run(load(LENS | tables))
     assert any(not np.array_equal(cold[name], warm[name]) for name in names)
