@@ -28,7 +28,7 @@ from sim.spectrum.measured import StressMap
 
 PAGE = Path(__file__).with_name("validation.md")
 PICTURE = PAGE.with_suffix(".png")
-START, END = "<!-- table: make_validation.py -->\n\n", "\n\n<!-- end of the table -->"
+START, END = "<!-- table: make_validation.py -->", "<!-- end of the table -->"
 #: Relative precision of the radius of an edge that lags (`sim.parts.contact.front`).
 _EDGE = 1e-7
 Array = NDArray[np.float64]
@@ -469,10 +469,11 @@ def main() -> None:
         key.legend(loc="center", frameon=False)
         style.save(figure, PICTURE)
     text = PAGE.read_text(encoding="utf-8")
-    before, _, rest = text.partition(START)
-    _, _, after = rest.partition(END)
-    table = "\n".join(rows(results))
-    PAGE.write_text(f"{before}{START}{table}{END}{after}", encoding="utf-8")
+    # a page without a marker is not replaced by its beginning
+    (before, rest), table = text.split(START), "\n".join(rows(results))
+    _, after = rest.split(END)
+    page = f"{before}{START}\n\n{table}\n\n{END}{after}"
+    PAGE.write_text(page, encoding="utf-8")
     for item in results:
         print(f"{item.against}: {item.quantity}: {item.difference:.1e}", item.holds)
     sys.exit(not all(item.holds for item in results))

@@ -308,7 +308,12 @@ QUICK = {
     for name in ("cluster", "first_contact", "jkr_only", "paper", "stick_slip")
 } | {"README.md"}
 #: Pages whose numbers another test has: computed from the laws, by other commands, or by a program that makes the page.
-APART = {"docs/dataset.md", "docs/design.md", "docs/theory.md"}
+APART = {
+    "docs/dataset.md",
+    "docs/design.md",
+    "docs/theory.md",
+    "docs/validation.md",
+}
 #: Numbers that no command of their page prints, because the page states them: limits and defaults of the program,
 #: examples of the notation, exit codes, versions, years and measurements on several systems.
 STATED = {
@@ -368,7 +373,7 @@ def printed_by(page):
                 for number in every
                 for line in lines
             ]
-        elif {"cluster", "browser"} & {*words}:
+        elif {"cluster", "browser", "measured"} & {*words}:
             lines = []
         for line in lines:
             done = command_line(*line)
@@ -400,6 +405,28 @@ def test_what_a_page_shows_runs_and_prints_the_numbers_of_the_page(
     stated = {*STATED.get(page, "").split()}
     assert numbers_of(page) - inputs_of(page) - printed <= stated
     assert stated <= numbers_of(page)
+
+
+@pytest.mark.verify
+def test_the_fits_of_the_measured_loop_print_the_numbers_of_the_page(
+    tmp_path, monkeypatch
+):
+    if not (path := os.environ.get("SIM_MEASURED_LOOP")):
+        pytest.skip("SIM_MEASURED_LOOP names the file, which has no licence to be here")
+    shutil.copy(path, tmp_path / "test-5")
+    shutil.copy(ROOT / "docs" / "measured_loop.toml", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    page, output = "docs/validation.md", ""
+    for words, code in blocks(page):
+        for line in command_lines(code) if "measured" in words else ():
+            done = command_line(*line)
+            assert done.exit_code == 0, (line, done.stderr)
+            output += done.output
+    rows = re.findall(r"(?m)^\| (?:zero|the same) .*", text_of(page))
+    assert len(rows) == 3
+    printed = {*NUMBER.findall(output)}
+    assert {number for row in rows for number in NUMBER.findall(row)} <= printed
+    assert {"0.8887", "1.156"} <= printed
 
 
 def test_numbers_of_theory_and_choosing_that_no_command_prints_follow_from_laws_and_own_constants():
