@@ -55,6 +55,8 @@ class Setting(NamedTuple):
         Side of the square that has the contact's area at rest [m].
     times : Times
         Clock of the run.
+    by_maximum : bool
+        True if the numbers of the bonds follow from a friction maximum that was given.
     """
 
     solid: ElasticSolid
@@ -62,6 +64,7 @@ class Setting(NamedTuple):
     rest_radius: float
     cell: float
     times: Times
+    by_maximum: bool
 
 
 def _constant(value: float) -> Array:

@@ -345,11 +345,7 @@ class Scenario:
     @cached_property
     def population(self) -> BondModel:
         """Return the model of the bonds, at the temperature; model = "auto" is chosen by their number."""
-        result = self._at_temperature("bonds", self._bonds_at_reference)
-        # of a friction maximum that was given, which bonds at a temperature follow, too
-        if "has_stress" in vars(self._bonds_at_reference):
-            vars(result)["has_stress"] = True
-        return result
+        return self._at_temperature("bonds", self._bonds_at_reference)
 
     @cached_property
     def _bonds_at_reference(self) -> BondModel:
@@ -484,7 +480,12 @@ class Scenario:
         """Return the constants from which parts make their remarks."""
         strength = float(self.population.steady(np.zeros(1)).strength[0])
         return Setting(
-            self.elastic, strength, self.rest_radius, self._square, self.times
+            self.elastic,
+            strength,
+            self.rest_radius,
+            self._square,
+            self.times,
+            "rebinding_ratio" in quantities(self.bonds),
         )
 
     @cached_property

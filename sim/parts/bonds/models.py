@@ -501,8 +501,6 @@ class _Stretched(_BondModel):
 
     #: Rates and site density of a critical speed and a stress: those of the exact density over the stretch.
     numbers_of: ClassVar = staticmethod(schallamach.bell_numbers)
-    #: True if the friction maximum was given.
-    has_stress: ClassVar[bool] = False
     #: Attribute of the rupture laws that the population can have; empty if it can have any.
     needs: ClassVar[str] = ""
 
@@ -535,15 +533,13 @@ class _Stretched(_BondModel):
         )
         rate, rebinding, density = map(float, self.numbers_of(*wanted))
         rupture = replace(bell, zero_force_rate=rate, critical_speed=None, stress=None)
-        result = replace(
+        return replace(
             self,
             rupture=rupture,
             rebinding_rate=rebinding,
             rebinding_ratio=None,
             site_density=density,
         )
-        vars(result)["has_stress"] = True
-        return result
 
     @cached_property
     def law(self) -> RuptureRate:
@@ -664,7 +660,7 @@ class FirstMoment(_OverArea, _Stretched):
             else 0.0
         )
         remark = f'the mean stretch overpredicts the friction maximum by {excess:.0%}; bonds.model = "cohort" is exact'
-        return [*remarks, remark] if excess and not self.has_stress else remarks
+        return [*remarks, remark] if excess and not setting.by_maximum else remarks
 
     def bonding(self, state: Stretches) -> Bonding:
         mean = np.divide(
