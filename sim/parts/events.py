@@ -90,8 +90,8 @@ _SPENT = "work", "path"
 _MARKS = "begin", "half", "quarter", "first", "middle", "final"
 #: State of the detector: sense in which the stage last moved, and that of its last step (0 at rest). Then the last
 #: sample. Then the speed of the stage when the slider was last not faster, or the largest one since; 1 if the slider is
-#: faster than the stage; 1 if it slips; its place when it was last faster; place and force at which it became faster,
-#: and at which it began to slip; number of episodes that are events but for the speed of the slider. Then the times of
+#: faster than the stage; 1 if it slips; its place when it was last faster; place and force at which it became faster
+#: than that speed, a place of nan if it did not, and at which it began to slip; number of episodes that are events but for the speed of the slider. Then the times of
 #: the last two events and their count, the event that may come, as ``SLIP``, and the marks.
 SLIPPING = record(
     "sense motion clock stage stage_speed position force work path "
@@ -132,7 +132,7 @@ class Slips(NamedTuple):
       with mass oscillates on its spring or on bonds that hold. There it goes back as far as it then advances.
 
     A slow fall of the force beyond a friction maximum is no event, because the slider is hardly faster than the stage.
-    Episodes in which the slider is faster than the stage, but not ten times, and that keep the last two rules, are
+    Episodes in which the slider is faster than the stage, but not ten times, and that keep the three rules, are
     counted apart: in a fast oscillation, or if a clock step is too long to show the speed of a slip.
     An event that the stage ends by turning back counts; one that lasts beyond the end of the run does not.
     """
@@ -274,7 +274,10 @@ def _goes_on(sample, factor, state, event):
     if drawn > 0.0 and gone > drawn:
         state.reference = max(state.reference, drawn / duration)
     if gone > (drawn if drawn > 0.0 else state.reference * duration):
+        # a slider that lags behind a stage that slows down is never faster than the stage was
         if state.faster == 0.0:
+            state.faster_start = math.nan
+        if math.isnan(state.faster_start) and gone > state.reference * duration:
             state.faster_start = state.sense * state.position
             state.faster_force = state.sense * state.force
         if state.slips == 0.0:

@@ -112,7 +112,8 @@ def test_a_stage_that_slows_down_stops_or_turns_makes_no_slip_event_of_a_slider_
             slider[k] = slider[k - 1] + lag / 20.0
         ratio = np.diff(slider)[200:300] / max(abs(after), 1e-3)
         assert after == -1.0 or ratio.max() > 10.0
-        assert detected(stage, slider).total[0] == 0.0
+        result = detected(stage, slider)
+        assert result.total[0] == 0.0 and result.state["slow"][0] == 0.0
 
 
 def test_a_slip_while_the_stage_rests_is_one_and_has_no_recurrence_across_the_stop():
