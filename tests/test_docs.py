@@ -328,6 +328,7 @@ STATED = {
     "docs/own_data.md": "1,000",
     "docs/paper.md": "2020 2021 2025 112 2018 145 133 2019 103744 1710.06506 43 0.1 0.12 1.6 6.4 42",
     "docs/plan.md": "5.6 400",
+    "docs/recipes.md": "20",
     "docs/reliability.md": "73 74 75 130 2.0 2.1 2.2",
     "docs/reproducibility.md": "64 512 2e-13 7e-12 2e-9 2e-4 1.3",
 }

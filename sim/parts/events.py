@@ -91,8 +91,9 @@ _MARKS = "begin", "half", "quarter", "first", "middle", "final"
 #: State of the detector: sense in which the stage last moved, and that of its last step (0 at rest). Then the last
 #: sample. Then the speed of the stage when the slider was last not faster, or the largest one since; 1 if the slider is
 #: faster than the stage; 1 if it slips; its place when it was last faster; place and force at which it became faster
-#: than that speed, a place of nan if it did not, and at which it began to slip; number of episodes that are events but for the speed of the slider. Then the times of
-#: the last two events and their count, the event that may come, as ``SLIP``, and the marks.
+#: than that speed, a place of nan if it did not, and at which it began to slip; number of episodes that are events but
+#: for the speed of the slider. Then the times of the last two events and their count, the event that may come, as
+#: ``SLIP``, and the marks.
 SLIPPING = record(
     "sense motion clock stage stage_speed position force work path "
     "reference faster slips farthest faster_start faster_force start from_force slow "
