@@ -78,6 +78,9 @@ REVERSIBLE = Condition(
 LAGGING_EDGE = Condition(
     'contact.model = "rate_dependent"', lambda scene: scene.contact.lags
 )
+WITH_ADHESION = Condition(
+    "adhesion.work above 0", lambda scene: scene.adhesion.work > 0.0
+)
 WITH_RANGE = Condition(
     'contact.model = "cohesive"', lambda scene: scene.contact.model == "cohesive"
 )
@@ -123,7 +126,11 @@ NO_RATIO = f"the contact or that of JKR is open, or {ENDED}"
 NO_SLIPS = "there are no two slip events"
 NO_ONSET = "slip events do not set in as the stage gets faster, or there are no two"
 NO_END = "slip events do not end as the stage gets slower, or there are no two"
-NO_MAXIMUM = "friction does not fall by 1 % from its first maximum before it exceeds it"
+NO_MAXIMUM = (
+    "friction does not fall by 1 % from its first maximum before it exceeds it or the "
+    "stage slows down"
+)
+NO_PEAK = "the value at an end of the run is as large"
 STAYS_CLOSED, NO_JUMP_IN = "the contact does not open", "no contact jumps in"
 WITHOUT_TENSION = "the contact bears no tension"
 
@@ -261,6 +268,7 @@ RECORDS: tuple[Definition, ...] = (
         "masked",
         "1",
         "1 if the effective work of adhesion is not positive (a Hertz contact)",
+        exists_when=WITH_ADHESION,
     ),
     Definition(
         "detachment_time",
@@ -538,6 +546,7 @@ DERIVED: tuple[Definition, ...] = (
         heading="masked",
         form=Form.SHARE,
         absent=f"no contact is closed, or {ENDED}",
+        exists_when=WITH_ADHESION,
     ),
     Definition(
         "correlation_time",
@@ -559,6 +568,7 @@ WITH_PHASES: tuple[Definition, ...] = (
         ),
         symbol="tau_p",
         heading="peak of stress",
+        absent=NO_PEAK,
     ),
     Definition(
         "peak_time",
@@ -566,12 +576,14 @@ WITH_PHASES: tuple[Definition, ...] = (
         "time of the largest shear stress",
         symbol="t_p",
         heading="peak of stress after",
+        absent=NO_PEAK,
     ),
     Definition(
         "peak_speed",
         "m/s",
         "sliding speed at the largest shear stress",
         heading="peak of stress at V",
+        absent=NO_PEAK,
     ),
     Definition(
         "peak_area",
@@ -585,18 +597,21 @@ WITH_PHASES: tuple[Definition, ...] = (
         "largest magnitude of the friction force of the run, of the highest start",
         symbol="F_p",
         heading="peak of friction",
+        absent=NO_PEAK,
     ),
     Definition(
         "peak_friction_time",
         "s",
         "time of the largest friction force",
         heading="peak of friction after",
+        absent=NO_PEAK,
     ),
     Definition(
         "peak_friction_speed",
         "m/s",
         "sliding speed at the largest friction force",
         heading="peak of friction at V",
+        absent=NO_PEAK,
     ),
     Definition(
         "peak_friction_area", "m^2", "contact area at the largest friction force"
@@ -606,7 +621,7 @@ WITH_PHASES: tuple[Definition, ...] = (
         "N",
         (
             "first maximum of the friction force after a rest, if it then falls by 1 % "
-            "before it exceeds the maximum; else nan"
+            "before it exceeds the maximum or the stage slows down; else nan"
         ),
         symbol="F_s",
         exists_when=FROM_REST,
@@ -721,6 +736,7 @@ OF_THE_RUN: tuple[Definition, ...] = (
         "s",
         "time at which the contact is first masked",
         absent="the contact is never masked",
+        exists_when=WITH_ADHESION,
     ),
     Definition(
         "time_masked",
@@ -729,6 +745,7 @@ OF_THE_RUN: tuple[Definition, ...] = (
         heading="masked, of the time",
         form=Form.SHARE,
         absent="the contact was never closed",
+        exists_when=WITH_ADHESION,
     ),
     Definition(
         "runaway_force",
@@ -1010,6 +1027,7 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "share of members that were masked at some time",
         heading="masked, of members",
         form=Form.SHARE,
+        exists_when=WITH_ADHESION,
     ),
     Definition(
         "half_masked",
@@ -1017,9 +1035,13 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "time at which half of the members had been masked",
         heading="half masked",
         absent="fewer than half of the members were masked",
+        exists_when=WITH_ADHESION,
     ),
     Definition(
-        "masked_rate", "1/s", "first maskings per time before them, of all members"
+        "masked_rate",
+        "1/s",
+        "first maskings per time before them, of all members",
+        exists_when=WITH_ADHESION,
     ),
     Definition(
         "loop_energy",
@@ -1050,8 +1072,8 @@ OF_MEMBERS: tuple[Definition, ...] = (
     Definition(
         "area_at_threshold",
         "1",
-        "contact area at the static threshold over that at rest",
-        heading="A/A0 there",
+        "contact area at the static threshold over that of JKR theory at rest",
+        heading="A/A_JKR there",
         form=Form.PERCENT,
         absent=NO_MAXIMUM,
     ),

@@ -255,16 +255,21 @@ def _event(
 def _first_maxima(scene: Scenario, state: State) -> np.ndarray:
     """Return the first maximum of the friction after each rest, as records ``RISE``, shape (rows, phases).
 
-    It stands in the phase after the rest, whichever phase it is in before the next rest.
+    It stands in the phase after the rest, whichever phase it is in before the next rest. The friction also falls where
+    the prescribed motion slows down or turns back, so the first maximum must have been passed before.
     """
     phases, rows = scene.phases, len(state.events.rise)
     result = np.zeros((rows, len(phases.starts)), RISE)
     result[:] = np.nan
     drive = cast(Any, scene.drive)
     begin = 0 if drive.model == "spring" and drive.start == "rest" else None
-    for phase, rests in enumerate(phases.rests):
+    for phase, (rests, slows) in enumerate(
+        zip(phases.rests, phases.slows, strict=True)
+    ):
         if rests:
             begin = phase + 1
+        elif slows:
+            begin = None
         elif begin is not None:
             result[:, begin] = state.events.first_maximum(phase)
     return result

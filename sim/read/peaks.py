@@ -198,7 +198,7 @@ def static_threshold(dataset: xr.Dataset) -> Estimates:
     Returns
     -------
     dict of str to Estimate
-        ``static_threshold`` [N]; ``area_at_threshold`` [1], the contact area there over that at rest; and
+        ``static_threshold`` [N]; ``area_at_threshold`` [1], the contact area there over JKR's at rest; and
         ``threshold_after`` [s], the time of the threshold. nan if the friction does not fall by 1 % from its first
         maximum before it exceeds the maximum again. Empty of other drives.
 
@@ -220,8 +220,8 @@ def static_threshold(dataset: xr.Dataset) -> Estimates:
             "static_threshold_area",
         )
     )
-    at_rest = ensemble_mean(dataset["contact_area"]).isel(t=0, drop=True)
-    about = f"contact area at the {text} over that at rest"
+    at_rest = math.pi * dataset["radius_at_rest"] ** 2
+    about = f"contact area at the {text} over that of JKR theory at rest"
     return {
         "static_threshold": Estimate(labelled(force, "N", text)),
         "area_at_threshold": Estimate(pure(area / at_rest, about)),

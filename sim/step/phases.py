@@ -17,11 +17,16 @@ _SAME = 1e-9
 
 
 class Phases(NamedTuple):
-    """Phases of a run: their starts [s], names, and the first clock step of each."""
+    """Phases of a run: their starts [s], names, and the first clock step of each.
+
+    ``slows`` is True for each phase in which the prescribed motion gets slower, or begins slower than before or in the
+    other direction.
+    """
 
     starts: tuple[float, ...]
     names: tuple[str, ...]
     steps: tuple[int, ...]
+    slows: tuple[bool, ...]
 
     @property
     def rests(self) -> tuple[bool, ...]:
@@ -44,10 +49,10 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
     of_drive = {0.0: steady, 1.0: f"increasing {words}", -1.0: f"decreasing {words}"}
     of_contact = {0.0: f"constant {kind}", 1.0: "approach", -1.0: "retraction"}
     starts = sorted({*moved, *pressed})
-    result: dict[int, tuple[float, str]] = {}
+    result: dict[int, tuple[float, str, bool]] = {}
     for start in starts:
         place = [max(at for at in course if at <= start) for course in (moved, pressed)]
-        sense, trend = moved[place[0]]
+        sense, trend, jump = moved[place[0]]
         names = [
             "rest" if sense == 0.0 else of_drive[trend],
             of_contact[pressed[place[1]][1]],
@@ -60,20 +65,22 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
         # the first whose middle is later
         step = math.floor(start / times.step + 0.5) + 1
         if step <= times.steps:
-            result[step] = start, ", ".join(shown or names[:1])
-    columns: Any = zip(
-        *((*result[step], step) for step in sorted(result)[:_MOST_PHASES]), strict=True
-    )
-    return Phases(*columns)
+            slows = trend < 0.0 or (start in moved and jump < 0.0)
+            result[step] = start, ", ".join(shown or names[:1]), slows
+    steps = sorted(result)[:_MOST_PHASES]
+    columns: Any = zip(*(result[step] for step in steps), strict=True)
+    begins, titles, slowing = columns
+    return Phases(begins, titles, tuple(steps), slowing)
 
 
-def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
-    """Return the starts of intervals [s] in which a course keeps its sense and its trend, with both.
+def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float, float]]:
+    """Return the starts of intervals [s] in which a course keeps its sense and its trend, with both, and its jump.
 
-    The sense of a course that is not ``signed`` is 1; the trend of one that is that of its magnitude.
+    The sense of a course that is not ``signed`` is 1; the trend of one that is that of its magnitude. The jump is how
+    much the value at the start exceeds the one before, in the sense of the latter.
     """
     largest = max(np.abs(pieces.first).max(), np.abs(pieces.last).max())
-    result: dict[float, tuple[float, float]] = {}
+    result: dict[float, tuple[float, float, float]] = {}
     before, value = (math.nan, math.nan), math.nan
     for start, stop, first, last in zip(*pieces[1:5], strict=True):
         crossing = (
@@ -93,7 +100,8 @@ def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float]]:
                 sense,
                 float(np.sign(change)) if abs(change) > _SAME * largest else 0.0,
             )
-            if now != before or abs(low - value) > _SAME * largest:
-                result[float(at)] = now
+            jumps = abs(low - value) > _SAME * largest
+            if now != before or jumps:
+                result[float(at)] = (*now, (low - value) * before[0] if jumps else 0.0)
             before, value = now, high
     return result

@@ -83,10 +83,16 @@ def has_been_masked(records):
 
 
 def has_fallen(records):
-    """Friction falls by 1 % from its largest value so far, before it exceeds it."""
+    """Friction falls by 1 % from its largest value so far, before it exceeds it and before the stage slows down."""
     force = np.abs(records.of("friction_force"))
+    end = force.shape[1]
+    if "stage_position" in records:
+        speeds = np.diff(records.of("stage_position")[0]) / np.diff(records.time)
+        fastest = np.maximum.accumulate(np.abs(speeds))
+        slower = speeds * np.sign(speeds.sum()) < (1.0 - ROUNDING) * fastest
+        end = int(np.argmax(slower)) + 1 if slower.any() else end
     verdicts = []
-    for row in force:
+    for row in force[:, :end]:
         row = row[np.isfinite(row)]
         largest = np.maximum.accumulate(row)
         bears = largest > 0.0
