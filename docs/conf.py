@@ -37,6 +37,7 @@ nb_execution_mode = "off"  # outputs are stored, and a test executes the noteboo
 
 default_role = "code"  # of docstrings: `sim run` is a command
 autosummary_generate = True
+autosummary_ignore_module_all = False  # a folder lists what its face hands on
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False

@@ -18,6 +18,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
+from docutils.utils.math.latex2mathml import tex2mathml
 from helpers.commands import sim as command_line
 from markdown_it import MarkdownIt
 from numpy.testing import assert_allclose
@@ -99,6 +100,16 @@ def test_links_between_pages_lead_to_files_and_headings():
             path = (ROOT / page).parent.joinpath(target) if target else ROOT / page
             assert path.exists(), (page, target)
             assert not heading or heading in anchors(path), (page, target, heading)
+
+
+@pytest.mark.parametrize("page", sorted(page for page in PAGES if "$" in text_of(page)))
+def test_each_formula_of_a_page_can_be_shown_by_the_site(page):
+    prose = re.sub(r"```.*?```", "", text_of(page), flags=re.DOTALL)
+    prose = re.sub(r"`[^`]*`", "", prose)
+    formulas = [code for words, code in blocks(page) if words == ["math"]]
+    formulas += re.findall(r"(?<![\\$])\$([^$]+)\$", prose)
+    for formula in formulas:
+        assert tex2mathml(formula), formula
 
 
 #: Pages that have names of former versions, too.

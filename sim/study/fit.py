@@ -53,6 +53,9 @@ from sim.units.errors import BadInput
 from sim.units.notation import chance, concise, engineering, in_units, scaled
 from sim.units.quantity import Quantity, read_option
 
+#: Names of the documentation; the others serve the commands.
+__all__ = ["Estimate", "Fit", "NoDifference", "fit"]
+
 #: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
 _WIDE = 1e4
 #: Change of another number without bounds at most, over its size.

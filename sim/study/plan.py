@@ -37,6 +37,9 @@ from sim.units.notation import concise, engineering, in_units, scaled
 from sim.units.tables import ERROR
 from sim.units.terminal import progress_bar
 
+#: Names of the documentation; the others serve the commands.
+__all__ = ["Chance", "Expected", "Plan", "Point", "plan"]
+
 #: Simulated data sets of each truth, and fewest; speeds of further points by default; points that are simulated.
 SIMS, LEAST_SIMS, _SPEEDS, _BEST = 400, 50, 20, 3
 #: Least noncentrality that scipy knows.
