@@ -1,5 +1,9 @@
 """Configuration of the documentation site: ``make docs``."""
 
+import importlib
+import inspect
+import re
+import types
 from html import escape
 from importlib import metadata
 from pathlib import Path
@@ -37,12 +41,36 @@ nb_execution_mode = "off"  # outputs are stored, and a test executes the noteboo
 
 default_role = "code"  # of docstrings: `sim run` is a command
 autosummary_generate = True
-autosummary_ignore_module_all = False  # a folder lists what its face hands on
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 copybutton_prompt_text, copybutton_prompt_is_regexp = r">>> |\.\.\. ", True
 smartquotes = False  # two dashes of an option stay two dashes
+
+#: Names that have a page elsewhere.
+ELSEWHERE = {"sim.read": {"Run"}, "sim.solid": {"Mount"}}
+
+
+def _face(module: str) -> dict[str, list[str]]:
+    """Return the public functions and classes of a module: those that it hands on, or else its own."""
+    face = importlib.import_module(module)
+    handed_on = getattr(face, "__all__", None)
+    own = (name for name in vars(face) if not name.startswith("_"))
+    result: dict[str, list[str]] = {"functions": [], "classes": []}
+    for name in sorted({*(handed_on or own)} - ELSEWHERE.get(module, set())):
+        item = getattr(face, name)
+        if handed_on is None and getattr(item, "__module__", "") != module:
+            continue
+        # an alias of a type is neither
+        if callable(item) and not isinstance(item, types.GenericAlias):
+            result["classes" if inspect.isclass(item) else "functions"].append(name)
+    return result
+
+
+_MODULES = re.findall(
+    r"^   (sim[\w.]*)$", Path(__file__).with_name("api.md").read_text("utf-8"), re.M
+)
+autosummary_context = {"faces": {module: _face(module) for module in _MODULES}}
 
 #: Pages of the site that are files of the folder above, each with its name here.
 ABOVE = {
@@ -71,6 +99,7 @@ def setup(app: Any) -> None:
     app.connect("doctree-resolved", _put_drawings_into_the_page)
     app.connect("source-read", _read_files_above)
     app.connect("build-finished", _complete_landmarks)
+    app.connect("autodoc-skip-member", _skip_fields)
 
 
 #: Parts of the theme's pages, each with what a screen reader or a keyboard needs.
@@ -113,6 +142,14 @@ def _put_drawings_into_the_page(app: Any, doctree: nodes.document, page: str) ->
             image.replace_self(
                 nodes.raw("", drawing.replace('role="img"', label, 1), format="html")
             )
+
+
+def _skip_fields(
+    app: Any, what: str, name: str, member: Any, skip: bool, options: Any
+) -> bool | None:
+    """Leave out the fields of a record, which its docstring has with their meanings."""
+    text = getattr(member, "__doc__", None) or ""
+    return True if text.startswith("Alias for field number") else None
 
 
 def _add_kinds(app: Any, context: Any, lines: list[str]) -> None:
