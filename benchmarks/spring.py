@@ -93,6 +93,42 @@ SLIDERS: dict[str, tuple[float, float, int, dict[str, float]]] = {
 }
 
 
+#: A slider whose body rings about a period in a clock step of 1 ms, and draws of ΔΓ that kick it.
+KICKED: dict[str, Any] = {
+    "seed": 5,
+    "clock": {"duration": 1.0, "step": 1e-3},
+    "solid": {"shear_modulus": 1.5e6},
+    "sphere": {"radius": 2.2e-3},
+    "adhesion": {"work": 0.044},
+    "contact": {"load": 4e-3},
+    "drive": {
+        "model": "spring",
+        "stage": 1.2e-3,
+        "stiffness": 140.0,
+        "mass": 1.5e-5,
+        "damping": 0.06,
+        "start": "steady",
+    },
+    "bonds": {
+        "model": "rate",
+        "rupture": {"model": "bell", "zero_force_rate": 25.0, "bell_force": 4e-12},
+        "bond_stiffness": 8e-7,
+        "rebinding_rate": 250.0,
+        "site_density": 6.5e16,
+    },
+}
+SPECTRUM = {"model": "von_karman", "rms": 1.2e5, "length": 9e-6, "hurst": 0.5}
+DRAWN = {
+    "shear": {
+        "model": "banded",
+        "cell": 2.4e-4,
+        "points": 256,
+        "spectrum": SPECTRUM,
+        "correlation": {"model": "slip", "length": 6e-6},
+    }
+}
+
+
 def spring(bench: Bench) -> list[Row]:
     """Sliders beside LSODA and a compiled explicit pair, those that feel ΔΓ, and 1000 slips with 10⁵ records."""
     rows = []
@@ -159,7 +195,7 @@ def spring(bench: Bench) -> list[Row]:
         work = f"a bond's life: slider on {sites:,} tracked bonds behind a spring"
         rows.append(absolute(work, microseconds, "µs", 1.5))
 
-    rows += events(bench)
+    rows += events(bench) + kicked(bench)
     long = scene(bench.of(2400.0, 1.0), bench.of(10**5, 10), TOLERANCE)
     seconds = [spent(lambda: followed(long)) for _ in range(bench.of(5, 1))]
     rows.append(
@@ -198,6 +234,26 @@ def events(bench: Bench) -> list[Row]:
         work = f"an event: {sites:,} tracked bonds that carry the adhesion"
         rows += bench.compare(work, programs[0], other, share=counts[0], turns=7)
     return rows
+
+
+def kicked(bench: Bench) -> list[Row]:
+    """Row of a slider whose body rings a period in each clock step after a draw of ΔΓ, beside one without draws."""
+    members, steps = 4, bench.of(1000, 2)
+    clock = {"clock.duration": f"{steps} ms", "clock.record": f"{steps} ms"}
+    of, still = (
+        sim.load(tables, clock).points()[0] for tables in (KICKED | DRAWN, KICKED)
+    )
+    count = float(members * steps)
+    other = Beside(
+        "the same slider without fluctuations",
+        functools.partial(ended, still, members),
+        share=count,
+        goal=3.0,
+        bound=True,
+    )
+    work = "a member's step of 1 ms: slider kicked by draws of ΔΓ"
+    program = functools.partial(ended, of, members)
+    return bench.compare(work, program, other, share=count, turns=7)
 
 
 def parts(bench: Bench, lens: Scenario) -> list[Row]:

@@ -5,13 +5,15 @@ driven slider and bonds with a stretch are advanced in sub-steps or from event t
 afterwards. Therefore pieces at several times of such a run are timed.
 """
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots
 from sim.ensemble.swept import spread
 from sim.numerics.stopwatch import stopwatch
+from sim.parts.drive import ENERGY, Driven
+from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.step.state import MemberNoise, State, pack, unpack
 from sim.step.stepper import Stepper
@@ -110,8 +112,12 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
             for _ in _PLACES[1:]
         ),
     ]
-    now = stopwatch()
-    end, rates = now() + most, np.ones(len(_PLACES))
+    now, duration = stopwatch(), clock.steps * clock.step
+    end, rates, powers = (
+        now() + most,
+        np.ones(len(_PLACES)),
+        [np.zeros(len(members))] * len(_PLACES),
+    )
     while True:
         began, longer = now(), list[float]()
         for number, place in enumerate(_PLACES):
@@ -119,9 +125,12 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
                 int(place * clock.steps * division) + count, stepper.scene.times.steps
             )
             steps, before = range(last - count + 1, last + 1), now()
-            before_piece = states[number]._replace(step=last - count)
-            states[number] = stepper.advance(before_piece, noise, steps)[0]
+            start = _balanced(point, states[number], powers[number] * place * duration)
+            start = start._replace(step=last - count)
+            states[number] = stepper.advance(start, noise, steps)[0]
             longer.append(max(now() - before, 1e-9) * division / count)
+            passed = count / division * clock.step
+            powers[number] = _work_between(point, start, states[number]) / passed
             if now() > end:
                 break
         number, after = len(longer), now()
@@ -148,6 +157,33 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
     if in_substeps(point) and measured > expected:  # sub-steps are made for each member
         return whole + (measured - expected) * len(plan.groups[0]) / len(members), whole
     return measured * whole / expected, whole
+
+
+def _balanced(point: Scenario, state: State, work: Array) -> State:
+    """Return a state in which the drive of each member has done some ``work`` [J] before, and no energy is missing.
+
+    Sub-steps are shortened by the energy that is missing beside the work since the start. A piece late in a run whose
+    work were that of a few pieces would make more of them than the run does there.
+    """
+    if not point.drive.solves_motion:
+        return state
+    drive = cast(Driven, state.drive)
+    energies = np.zeros((len(work), 1), ENERGY)
+    before = drive.energies.view(ENERGY)
+    energies["work"], energies["damping"] = work[:, np.newaxis], work[:, np.newaxis]
+    energies["stored"] = energies["first"] = before["stored"]
+    return state._replace(drive=drive._replace(energies=energies.view(float)))
+
+
+def _work_between(point: Scenario, start: State, end: State) -> Array:
+    """Return the work that the drive of each member has done between two states [J], 0 if it does not feel friction."""
+    if not point.drive.solves_motion:
+        return np.zeros(1)
+    first, last = (
+        cast(Driven, state.drive).energies.view(ENERGY)["work"][:, 0]
+        for state in (start, end)
+    )
+    return last - first
 
 
 def _divided(point: Scenario, divisions: int) -> Stepper:

@@ -353,8 +353,9 @@ def accept_nodes(row, nodes, start, step, slider, contact, limit, energy):
                     0.25 * (nodes[i - 1].area + node.area) * node.cut * limit * limit
                 )
             shift, share = node.slip - nodes[i - 1].slip, PLACES[i] - PLACES[i - 1]
+            path = math.fabs(shift)
             mechanics.remember(
-                row, shift, speeds[i - 1], speeds[i], share * step, contact
+                row, path, speeds[i - 1], speeds[i], share * step, contact
             )
     last = nodes[2]
     row.spring_force = mechanics.pull_on(start + step, start, last.body, row, slider)

@@ -329,28 +329,47 @@ def within_reach(slip, step, row, contact):
 
 
 @device
-def remember(row, slip, first_speed, last_speed, duration, contact):
+def path_of(slip, first_speed, last_speed, duration):
+    """Return the path of a slip in some time, in which the speed is a parabola in time with these ends.
+
+    It is longer than the slip if the speed changes its sign on the way, as that of a body which rings.
+    """
+    bend = 3.0 * (2.0 * slip - (first_speed + last_speed) * duration)
+    linear, start = (last_speed - first_speed) * duration + bend, first_speed * duration
+    # the speed is start + linear s - bend s² at a share s of the time, over it
+    path, before = 0.0, 0.0
+    under = linear * linear + 4.0 * bend * start
+    if under > 0.0:
+        root = 0.5 * (linear + math.copysign(math.sqrt(under), linear))
+        one, two = root / bend if bend != 0.0 else 1.0, -start / root
+        for turn in (min(one, two), max(one, two)):
+            if 0.0 < turn < 1.0:
+                at = turn * (start + turn * (0.5 * linear - turn * bend / 3.0))
+                path += math.fabs(at - before)
+                before = at
+    return path + math.fabs(slip - before)
+
+
+@device
+def remember(row, path, first_speed, last_speed, duration, contact):
     """Add a part of an accepted sub-step, between two of its nodes, to path and memory of the fluctuations.
 
     In it the speed is a parabola in time, and g² is linear in the path. Slip that took no time since the last part
     belongs to it.
     """
     field = contact.field
-    row.path += math.fabs(slip)
+    row.path += path
     row.felt += contact.fluctuating_rate * duration
     if field.length == math.inf:
         return
-    path = row.path - row.recalled
+    sliding = row.path - row.recalled
     change = math.fabs(last_speed) - math.fabs(first_speed)
-    bend = (
-        0.5 * (math.fabs(first_speed) + math.fabs(last_speed))
-        - math.fabs(slip) / duration
-    )
+    bend = 0.5 * (math.fabs(first_speed) + math.fabs(last_speed)) - path / duration
     spread = duration * (change * change / 12.0 + bend * bend / 5.0)
-    after, first, last = _after(row, path, duration, spread, field)
+    after, first, last = _after(row, sliding, duration, spread, field)
     row.weight, row.mean, row.spread = after
     row.recalled = row.path
-    exponent = 2.0 * (field.by_slip * path + field.by_time * duration)
+    exponent = 2.0 * (field.by_slip * sliding + field.by_time * duration)
     lost = -math.expm1(-exponent)
     size = lost
     if field.relaxing > 0.0:

@@ -26,6 +26,14 @@ BENDS = np.array(
     [[sum(row[k] * RATES[k, j] for k in range(3)) for j in range(3)] for row in RATES]
 )
 _OFF = np.array([sum(row) for row in RATES])
+#: Weights of the values at the nodes in the slope at the start of the polynomial through start and nodes.
+START = np.array(
+    [
+        np.prod([-d for d in NODES if d != c])
+        / (c * np.prod([c - d for d in NODES if d != c]))
+        for c in NODES
+    ]
+)
 
 
 #: Eigenvalue of ``RATES``, one of the complex pair; matrices that lead back to nodes and from them. The
@@ -535,6 +543,10 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
     """
     damping, viscosity = slider.damping, slider.viscosity
     shift, speed, body, going, passed = 0.0, 0.0, 0.0, row.speed, 0.0
+    # the speed of the polynomial there: that before a jump of the force is another
+    before_node = (
+        START[0] * nodes.slip[0] + START[1] * nodes.slip[1] + START[2] * nodes.slip[2]
+    ) / step
     _, first, _, _ = mechanics.contact_area(
         row.bound, row.moment, start, row.radius, contact
     )
@@ -580,15 +592,10 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
         if law.sense != 0.0:
             energy.rupture += share * area * moment * speed
         energy.area -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
-        mechanics.remember(
-            row,
-            nodes.slip[i] - shift,
-            going,
-            speed,
-            (NODES[i] - passed) * step,
-            contact,
-        )
-        shift, going, passed = nodes.slip[i], speed, NODES[i]
+        duration = (NODES[i] - passed) * step
+        path = mechanics.path_of(nodes.slip[i] - shift, before_node, speed, duration)
+        mechanics.remember(row, path, going, speed, duration, contact)
+        shift, going, passed, before_node = nodes.slip[i], speed, NODES[i], speed
     row.spring_force = nodes.pulls[2] - slider.stiffness * (
         nodes.slip[2] + nodes.sheared[2]
     )

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 import sim
 from sim.laws import jkr
 from sim.parts.bonds.models import Cohort, FirstMoment, Tracked
-from sim.parts.coupled import coupled
+from sim.parts.coupled import coupled, mechanics
 from sim.parts.drive import READINGS, Force, Spring
 from sim.parts.exchange import NO_DRAWS, Times
 from sim.parts.shear import Banded, Mean
@@ -90,6 +90,53 @@ def test_the_memory_within_a_clock_step_is_the_integral_along_the_slip(
             rtol=ERROR,
         )
         begin, values[3] = end, 0.0  # ΔΓ is drawn
+
+
+def test_the_path_of_a_body_that_rings_counts_each_of_its_turns():
+    # a mass on a spring whose stage stops after half a period: V (1 − cos ωt), then 2V cos ω(t − 1/2)
+    speed, turn, step, few = 10.0 * driven.STRETCH, 2.0 * math.pi, 0.35, 1e-7
+    stops = {"time": (0.0, 0.5, 0.5, 2.1), "value": (speed, speed, 0.0, 0.0)}
+    body = driven.spring(1.0, stops, mass=turn**-2, tolerance=1e-4)
+    lens = driven.scenario(
+        6.0 * step,
+        6,
+        body,
+        make=lambda **keys: FirstMoment(
+            **(keys | {"site_density": few * driven.DENSITY})
+        ),
+    )
+    stepper, noise, steps = lens.stepper, MemberNoise.of(1, np.arange(1)), range(1, 7)
+    state = stepper.start(noise)
+    motions = coupled.advance(
+        lens.parts,
+        state.drive,
+        state.bonds,
+        stepper._around(state.contact, state.shear, steps),
+        lens.times,
+        steps,
+        noise.bonds,
+        stepper._ends(state, noise, steps),
+    ).motions
+
+    def path(time):
+        if time <= 0.5:
+            return speed * (time - math.sin(turn * time) / turn)
+        swings, rest = divmod(turn * (time - 0.5), math.pi)
+        quarters = 2.0 * swings + (
+            math.sin(rest) if rest <= 0.5 * math.pi else 2.0 - math.sin(rest)
+        )
+        return 0.5 * speed + 2.0 * speed / turn * quarters
+
+    exact = np.diff([path(step * k) for k in range(7)])
+    assert_allclose(motions.path[:, 0], exact, rtol=few)  # the force of so few bonds
+
+
+def test_the_path_of_a_speed_with_two_turns_is_the_sum_of_its_three_parts():
+    # the speed 6 (s − 1/4)(s − 3/4) has the slips 1/8, −1/8, 1/8
+    assert mechanics.path_of(0.125, 1.125, 1.125, 1.0) == 0.375
+    assert mechanics.path_of(-0.125, -1.125, -1.125, 1.0) == 0.375
+    assert mechanics.path_of(0.5, 0.0, 1.0, 1.0) == 0.5
+    assert mechanics.path_of(0.0, -1.0, 1.0, 2.0) == 1.0
 
 
 def at_once(lens, state, expected, drawn):
