@@ -97,6 +97,10 @@ PLACED_AT_LOAD = Condition(
         and not (WITH_RANGE.holds(scene) and AT_A_LOAD.holds(scene))
     ),
 )
+KNOWN_ENERGY = Condition(
+    "a field with a correlation, a prescribed motion, and an amplitude without a memory",
+    lambda scene: scene.knows_energy,
+)
 FEELS_STEPS = Condition(
     "an edge that lags, or tension", lambda scene: scene.feels_steps
 )
@@ -197,6 +201,12 @@ RECORDS: tuple[Definition, ...] = (
         "elastic energy of the shear-stress fluctuations per area",
         symbol="DeltaGamma",
         heading="ΔΓ",
+    ),
+    Definition(
+        "expected_energy",
+        "J/m^2",
+        "mean of the fluctuation energy over all realisations, in closed form",
+        exists_when=KNOWN_ENERGY,
     ),
     Definition(
         "edge_energy",
@@ -980,6 +990,12 @@ NUMBERS: tuple[Definition, ...] = (
         "radius_at_rest", "m", "JKR radius at the full work of adhesion", symbol="a_0"
     ),
     Definition("radius_without_adhesion", "m", "Hertz radius", symbol="a_H"),
+    Definition(
+        "energy_variation",
+        "1",
+        "standard deviation of the fluctuation energy over its mean, in closed form",
+        exists_when=KNOWN_ENERGY,
+    ),
     Definition(
         "jkr_pull_off_load",
         "N",

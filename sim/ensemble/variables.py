@@ -21,6 +21,7 @@ from sim.parts.contact.cohesive import CohesiveDisplacement, CohesiveLoad
 from sim.parts.drive import READINGS, Driven, Force, Spring
 from sim.parts.events import LATE, MOMENTS, RISE, TURNS, Slips
 from sim.parts.exchange import TURN
+from sim.parts.shear.process import Renewing
 from sim.quantities import (
     OF_EACH_SLIP,
     OF_SLIPS,
@@ -112,6 +113,14 @@ def _stored(scene: Scenario, course: Trajectory) -> np.ndarray:
     return course.energy * cast(Shares, _terms(scene, course).margin).mean(
         _radius(scene, course)
     )
+
+
+def _expected(scene: Scenario, course: Trajectory) -> np.ndarray:
+    """Return the mean of ΔΓ over all realisations [J/m²], nan where it is not known."""
+    if not scene.knows_energy:
+        return np.full((1, 1), np.nan)
+    size = scene.fluctuations.law.factor(course.speed, course.strength)
+    return np.asarray(size**2 * cast(Renewing, scene.process).mean)
 
 
 def _edge(scene: Scenario, course: Trajectory) -> np.ndarray:
@@ -441,6 +450,7 @@ VARIABLES: tuple[Variable, ...] = (
     Variable("bond_fraction", "bonds", lambda scene, course: course.fraction),
     Variable("shear_stress", "bonds", lambda scene, course: course.stress),
     Variable("fluctuation_energy", "shear", _stored),
+    Variable("expected_energy", "drive", _expected),
     Variable("edge_energy", "contact", _edge),
     Variable(
         "work_of_adhesion", "contact", _until_stopped(lambda scene, course: course.work)
@@ -535,6 +545,11 @@ NUMBERS = (
         "radius_without_adhesion",
         "",
         lambda scene: scene.contact.equilibrium_radius(np.zeros(1), scene.bodies)[0],
+    ),
+    Variable(
+        "energy_variation",
+        "",
+        lambda scene: scene.process.variation if scene.knows_energy else np.nan,
     ),
     Variable(
         "jkr_pull_off_load",

@@ -31,6 +31,10 @@ class Estimate(NamedTuple):
         Effective number of independent values.
     reason : xarray.DataArray, optional
         Reason why there is no value, or why it is no mean; "" else.
+    plain : xarray.DataArray, optional
+        Plain mean over the members, if the value is that at the known mean of ΔΓ.
+    bias : xarray.DataArray, optional
+        Bound of the bias of such a value, nan where it is the plain mean.
     """
 
     value: xr.DataArray
@@ -44,6 +48,8 @@ class Estimate(NamedTuple):
     quantile_high: xr.DataArray | None = None
     number: xr.DataArray | None = None
     reason: xr.DataArray | None = None
+    plain: xr.DataArray | None = None
+    bias: xr.DataArray | None = None
 
     @property
     def unit(self) -> str:

@@ -104,7 +104,10 @@ def _columns_of(name: str, one: Estimate) -> dict[str, xr.DataArray]:
     if not bool(one.value.notnull().any()) and not has_reason:
         return {}
     result = {name: one.value}
-    for ending, values in (("error", one.sem), ("bound", one.bound)):
+    others = {"error": one.sem, "bound": one.bound, "bias": one.bias}
+    if one.plain is not None and bool((one.plain != one.value).any()):
+        result[f"{name}_plain"] = one.plain
+    for ending, values in others.items():
         if values is not None and bool((values > 0.0).any()):
             values = values.drop_attrs(deep=False).assign_attrs(units=one.unit)
             result[f"{name}_{ending}"] = values
@@ -207,6 +210,8 @@ _FIELDS = {
     "high": "high",
     "bound": "bound",
     "sd": "std",
+    "plain_mean": "plain",
+    "bias_bound": "bias",
 }
 #: Columns of quantiles: field, place, and name.
 _QUANTILES = [

@@ -10,6 +10,12 @@ import xarray as xr
 from scipy import special
 
 from sim.quantities import has_mean
+from sim.read.control_variate import (
+    ControlVariate,
+    control_variate,
+    corrected,
+    is_corrected,
+)
 from sim.read.correlation import AT_ONCE, LEVEL, WIDE, Array, covariance_of, inflation
 from sim.read.dataset import (
     MEMBERS,
@@ -550,6 +556,7 @@ def _of_each(
     span, result = _Span(words, sweep, noisy, openings), Estimates()
     readers = [_reader(part, names) for part in parts]
     known = chosen_observables(restricted(late, names).isel(t=[-1]), names)
+    control = None if minus else control_variate(late)
     for name in filter(has_mean, map(str, known)):
         variables = [reader(name) for reader in readers]
         differ = noisy & (MEMBERS in variables[0].dims)
@@ -561,9 +568,38 @@ def _of_each(
         values = values.reshape(-1, *values.shape[-2:])
         numbers, freedom = _over_time(values, name, differ)
         states = settlements(values, numbers["sem"], freedom, differ)
+        if control is not None and is_corrected(name) and MEMBERS in variables[0].dims:
+            numbers |= _at_known_mean(numbers, values, control, sweep)
         variable = variables[0].rename(name)
         result[name] = _described(variable, numbers, span, states, differ)
     return result
+
+
+def _at_known_mean(
+    plain: dict[str, Array],
+    values: Array,
+    control: ControlVariate,
+    sweep: xr.DataArray,
+) -> dict[str, Array]:
+    """Return mean, error and interval at the known mean of ΔΓ, where that is used, with plain mean and bound of bias.
+
+    ``values`` have the shape (points, members, records).
+    """
+    averaged = control.late()
+    regressors = [
+        rows_of(each.expand_dims("t", -1), sweep).reshape(values.shape[:2])
+        for each in averaged[:2]
+    ]
+    result = corrected(values.mean(axis=-1), *regressors)
+    is_used = averaged.is_used.broadcast_like(sweep).transpose(*sweep.dims)
+    is_used = is_used.to_numpy().ravel() & np.isfinite(result.sem)
+    low, high = interval("", result.mean, result.sem, result.freedom + 1.0)
+    numbers = {"value": result.mean, "sem": result.sem, "low": low, "high": high}
+    chosen = {
+        kind: np.where(is_used, array, plain[kind]) for kind, array in numbers.items()
+    }
+    bias = np.where(is_used, result.bias, np.nan)
+    return chosen | {"plain": plain["value"], "bias": bias}
 
 
 def _of_statistics(dataset: xr.Dataset, names: Collection[str] | None) -> Estimates:

@@ -14,6 +14,7 @@ import xarray as xr
 
 from sim.laws import cohesive, equilibrium, jkr
 from sim.quantities import OF_CONTACT, QUANTITIES
+from sim.read.control_variate import sources
 from sim.read.dataset import (
     MEMBERS,
     STATISTIC,
@@ -381,13 +382,14 @@ def restricted(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset
     """Return the dataset without trajectories that the observables ``names`` do not need; None stands for all."""
     if names is None:
         return dataset
-    sources = {source for name in names for source in _SOURCES.get(name, (name,))} | {
+    needed = {source for name in names for source in _SOURCES.get(name, (name,))} | {
         *_REFERENCES,
+        *sources(names),
         "in_contact",
     }
     if _shares_among(names):
-        sources |= {*_SOURCES_OF_SHARES, *_LOSSES.values()}
-    return with_trajectories(dataset, *sources)
+        needed |= {*_SOURCES_OF_SHARES, *_LOSSES.values()}
+    return with_trajectories(dataset, *needed)
 
 
 def chosen_observables(

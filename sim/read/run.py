@@ -27,6 +27,8 @@ _FIELDS = {
     "high": "high",
     "bound": "bound",
     "standard deviation": "std",
+    "plain mean": "plain",
+    "bias bound": "bias",
 }
 #: The quantity whose statistics are those of a time.
 _MEMORY = "correlation_time"

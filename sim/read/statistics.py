@@ -7,6 +7,12 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
+from sim.read.control_variate import (
+    ControlVariate,
+    control_variate,
+    corrected,
+    is_corrected,
+)
 from sim.read.correlation import LEVEL, WIDE, Array
 from sim.read.dataset import MEMBERS, STATISTIC, ensemble_mean, only_statistics, pieces
 from sim.read.estimate import Estimate, Estimates, joined
@@ -211,8 +217,48 @@ def values_at_ranks(ordered: Array, places: Array) -> Array:
 def over_members(
     dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True
 ) -> Estimates:
-    """Return the ``summary`` of observables at each sweep value and time, by default of all."""
+    """Return the ``summary`` of observables at each sweep value and time, by default of all.
+
+    Means of contact area, radius, friction and lost area are those at the known mean of ΔΓ, where it is known.
+    """
+
+    def of_piece(part: xr.Dataset) -> Estimates:
+        values = closed_observables(part, names)
+        result, control = summary(values, quantiles), control_variate(part)
+        if control is None:
+            return result
+        return {
+            name: _at_known_mean(one, values[name], control)
+            for name, one in result.items()
+        }
+
     dim, parts = pieces(restricted(dataset, names), ("t",))
-    return joined(
-        [summary(closed_observables(part, names), quantiles) for part in parts], dim
+    return joined([of_piece(part) for part in parts], dim)
+
+
+def _at_known_mean(
+    plain: Estimate, values: xr.DataArray, control: ControlVariate
+) -> Estimate:
+    """Return an estimate with the mean, its error and interval at the known mean of ΔΓ, where that is used."""
+    if not is_corrected(str(values.name)) or MEMBERS not in values.dims:
+        return plain
+    rows = [
+        each.broadcast_like(values).transpose(*plain.value.dims, MEMBERS).to_numpy()
+        for each in (values, *control[:2])
+    ]
+    result = corrected(*rows)
+    is_used = control.is_used.broadcast_like(plain.value).transpose(*plain.value.dims)
+    is_used = is_used & np.isfinite(result.sem)
+    low, high = interval("", result.mean, result.sem, result.freedom + 1.0)
+
+    def where_used(array: Array, other: Any) -> xr.DataArray:
+        return xr.where(is_used, plain.value.copy(data=array), other, keep_attrs=True)
+
+    return plain._replace(
+        value=where_used(result.mean, plain.value).assign_attrs(plain.value.attrs),
+        sem=where_used(result.sem, plain.sem),
+        low=where_used(low, plain.low),
+        high=where_used(high, plain.high),
+        plain=plain.value,
+        bias=where_used(result.bias, np.nan),
     )

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from sim.quantities import QUANTITIES, Definition, Form
+from sim.read.control_variate import control_variate, is_corrected
 from sim.read.correlation import WIDE, Array
 from sim.read.dataset import ensemble_mean, only_statistics
 from sim.read.errors import systematic_errors
@@ -448,6 +449,12 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
     phrases = []
     if sample := run.sample(run.has_one_row_each):
         phrases.append(f"mean over the {sample}")
+    if any(is_corrected(column.name) for t in shown for column in t.columns) and (
+        "energy_variation" in run.dataset and control_variate(run.dataset.isel(t=[0]))
+    ):
+        phrases.append(
+            "area, radius, friction and losses at the known mean of ΔΓ (plain means: --csv-all)"
+        )
     if any(re.search(r"\d\(", cell) for cell in cells):
         phrases.append("brackets: standard error in the last digits")
     if any("±" in cell for cell in cells):

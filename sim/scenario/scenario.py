@@ -613,6 +613,18 @@ class Scenario:
         return varies and (self.contact.lags or pulled(self))
 
     @property
+    def knows_energy(self) -> bool:
+        """Return True if the law of ΔΓ at each time is known: its field feels neither the friction nor earlier sliding.
+
+        The amplitude is then that of the moment, which all members share.
+        """
+        shear, law = self.fluctuations, self.fluctuations.law
+        if not shear.per_member or shear.measured or shear.spectrum.bond_made:
+            return False
+        feels = self.drive.solves_motion or law.relaxing or law.remembers
+        return not (feels or (law.reads_stress and self.varies["bonds"]))
+
+    @property
     def fluctuations_move_contact(self) -> bool:
         """Return True if random fluctuations change the area of the contact."""
         shear = self.fluctuations

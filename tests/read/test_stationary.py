@@ -213,26 +213,26 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
         )
     )
     result = read.distribution(dataset)
-    late = dataset["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None))
+    late = dataset["work_of_adhesion"].isel(t=slice(dataset.sizes["t"] // 2, None))
     assert_allclose(
-        result["contact_area"].value, late.mean(("member", "t")), rtol=1e-13
+        result["work_of_adhesion"].value, late.mean(("member", "t")), rtol=1e-13
     )
-    assert_allclose(result["contact_area"].std, late.std(("member", "t")), rtol=1e-9)
+    assert_allclose(result["work_of_adhesion"].std, late.std(("member", "t")), rtol=1e-9)
     means = late.mean("t")
     assert_allclose(
-        result["contact_area"].sem,
+        result["work_of_adhesion"].sem,
         means.std("member", ddof=1) / math.sqrt(20),
         rtol=1e-10,
     )
     assert_allclose(
-        result["contact_area"].quantile,
+        result["work_of_adhesion"].quantile,
         late.quantile(LEVELS, ("member", "t")).T,
         rtol=1e-13,
     )
-    assert result["contact_area"].value.dims == ("contact_load",) and bool(
+    assert result["work_of_adhesion"].value.dims == ("contact_load",) and bool(
         result["speed"].sem.isnull().all()
     )
-    assert result["contact_area"].unit == "m^2"
+    assert result["work_of_adhesion"].unit == "m^2"
 
 
 def squared_ornstein_uhlenbeck(rng, members, records, keep, pairs=5):

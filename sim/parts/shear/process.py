@@ -475,6 +475,12 @@ class Renewing:
         """Mean of ΔΓ at amplitude 1 [J/m²]."""
         return float(np.sum(self.gammas.weight * self.gammas.shape))
 
+    @property
+    def variation(self) -> float:
+        """Standard deviation of ΔΓ over its mean [1]; 0 without fluctuations."""
+        variance = np.sum(self.gammas.weight**2 * self.gammas.shape)
+        return math.sqrt(variance) / self.mean if self.mean > 0.0 else 0.0
+
     def change(self, path: Array, duration: float) -> Array:
         """Return the standard deviation of the change of ΔΓ at amplitude 1 [J/m²] over paths [m] in a time [s].
 
