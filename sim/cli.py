@@ -250,6 +250,22 @@ def cli() -> None:
     is_flag=True,
     help="Continue an unfinished run; the results are the same bit for bit.",
 )
+@click.option(
+    "--within",
+    metavar="ERROR",
+    help="Choose the cheapest settings with at most this error, such as 1 %.",
+)
+@click.option(
+    "--of",
+    "of",
+    metavar="NAMES",
+    help="With --within: quantities, such as friction_force,contact_area.",
+)
+@click.option(
+    "--budget",
+    metavar="TIME",
+    help="With --within: counted work that may be spent. Default: 60 s.",
+)
 @click.option("--quiet", is_flag=True, help="Print only errors.")
 @click.option(
     "--no-table",
@@ -269,6 +285,9 @@ def run(
     resume: bool,
     quiet: bool,
     bare: bool,
+    within: str | None,
+    of: str | None,
+    budget: str | None,
     **overrides: Any,
 ) -> None:
     """Run a scenario with its ensemble and sweep, and write a netCDF file."""
@@ -291,6 +310,14 @@ def run(
 
     from sim.ensemble import plan as plans, preview, simulate
 
+    about, sentence = dict[str, str](), ""
+    if goal := _goal(scene, within, of, budget):
+        _import_xarray()
+        from sim.study.within import answer
+
+        # nothing is computed for an output that is refused
+        simulate.claim(target, force or resume, simulate.files_read(scene))
+        scene, sentence, about = answer(scene, goal)
     plan = plans.Plan.of(scene)
     if not any(plan.share(*share)):
         tasks = sum(1 for _ in plan.tasks())
@@ -326,6 +353,7 @@ def run(
                     scene,
                     target,
                     **how,
+                    about=about,
                     memory=memory,
                     stage=shown.begin,
                     progress=shown.advance,
@@ -340,6 +368,8 @@ def run(
             tables = _tables_of(target)
     if tabulated:
         _print_tables(*tables)
+    if sentence and not quiet:
+        say(sentence)
     if not quiet:
         waits = f"shard {shard} is done; the last shard writes {target} (after a failure: --resume)"
         say(str(target) if target.exists() else waits)
@@ -350,6 +380,35 @@ def run(
         and (sentence := _unresolved(target))
     ):
         _fail(f"{target}: {sentence}", FAILED)
+
+
+def _goal(scene: Any, within: str | None, of: str | None, budget: str | None) -> Any:
+    """Return the accepted error of the options, or else of the table ``[accuracy]``; None without any."""
+    table = scene.accuracy
+    if within is None and table is None:
+        if of or budget:
+            name = "--of" if of else "--budget"
+            raise click.UsageError(
+                f'{name} belongs to --within "1 %", which is missing'
+            )
+        return None
+    from sim.units.quantity import read_option
+
+    error = (
+        table.within
+        if within is None
+        else read_option(within, "--within", "1", above=0, below=1)
+    )
+    names = () if table is None else table.of
+    if of is not None:
+        names = tuple(name.strip() for name in of.split(",") if name.strip())
+    seconds = 60.0 if table is None else table.budget
+    if budget is not None:
+        seconds = read_option(budget, "--budget", "s", above=0)
+    _import_xarray()
+    from sim.study.within import Goal
+
+    return Goal(error, names, seconds)
 
 
 def _unresolved(target: Path) -> str:

@@ -299,7 +299,7 @@ def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:
 
     ``per_member`` is True if every member is recorded, for a scenario that leaves this to the size of the run.
     """
-    optional = "instrument", "zero", "incipient"
+    optional = "instrument", "zero", "incipient", "accuracy"
     of_fits = {name for name in optional if not getattr(scenario, name)}
     dumped = TypeAdapter(Scenario).dump_python(
         scenario, by_alias=True, exclude={"source", "sweep"} | of_fits, mode="json"
@@ -366,6 +366,7 @@ def attributes(plan: Plan) -> dict[str, Any]:
         "members": np.int32(plan.members),
         "sim_version": sim_version,
         **{f"{name}_version": version for name, version in versions.items()},
+        **plan.about,
     }
 
 

@@ -2,8 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -108,14 +108,15 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """Parts of which the dataset of a scenario is made."""
+    """Parts of which the dataset of a scenario is made; ``about`` holds further attributes of the dataset."""
 
     scenario: Scenario
     points: tuple[Scenario, ...]
+    about: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, scenario: Scenario) -> "Plan":
-        return cls(scenario, tuple(scenario.points()))
+    def of(cls, scenario: Scenario, about: Mapping[str, str] | None = None) -> "Plan":
+        return cls(scenario, tuple(scenario.points()), about or {})
 
     @cached_property
     def members(self) -> int:

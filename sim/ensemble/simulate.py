@@ -5,7 +5,7 @@ import itertools
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -70,6 +70,7 @@ def run(
     shard: Shard = WHOLE,
     scheduler: str = "",
     memory: float = math.inf,
+    about: Mapping[str, str] | None = None,
 ) -> Any:
     """Run a scenario with its ensemble and its sweep.
 
@@ -98,6 +99,8 @@ def run(
         Address of a dask scheduler, whose workers take the place of processes.
     memory : float
         Memory that all processes together may take [byte]: fewer of them share the work if it is little.
+    about : mapping of str to str, optional
+        Further attributes of the dataset, which decide no number.
 
     Returns
     -------
@@ -121,7 +124,7 @@ def run(
     WorkerDied
         If processes died again and again at the same block.
     """
-    plan = Plan.of(scenario)
+    plan = Plan.of(scenario, about)
     if to is not None and not any(plan.share(*shard)):
         return Path(to)
     jobs = fitting(plan, jobs, memory, in_memory=to is None)

@@ -161,6 +161,25 @@ class Ensemble:
     ] = 1
 
 
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Accuracy:
+    """Accepted error of the means of some quantities: the run chooses the cheapest settings that keep it."""
+
+    within: Annotated[
+        float, Quantity("1", "accepted error, such as 1 %", "", above=0, below=1)
+    ]
+    of: Annotated[
+        tuple[str, ...],
+        Field(
+            description="quantities with this error; if omitted: contact area and radius, friction force and bond"
+            " fraction"
+        ),
+    ] = ()
+    budget: Annotated[
+        float, Quantity("s", "counted work that may be spent", "", above=0)
+    ] = 60.0
+
+
 def _times(value: Any) -> Any:
     """Return the times of a range, and anything else as it is."""
     return spaced(value) if isinstance(value, dict) else value
@@ -262,6 +281,7 @@ class Scenario:
     zero: Zero | None = None
     temperature: Temperature | None = None
     incipient: Incipient | None = None
+    accuracy: Accuracy | None = None
     sweep: Annotated[tuple[Any, ...], BeforeValidator(read_sweep)] = ()
     name: _Title = "sliding contact"
     seed: Annotated[

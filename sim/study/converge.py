@@ -14,7 +14,7 @@ import importlib.metadata
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -23,8 +23,6 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from pydantic import TypeAdapter
-from scipy import special
 
 from sim.ensemble.plan import seconds_a_step, together
 from sim.ensemble.variables import READ
@@ -45,8 +43,15 @@ from sim.plots.style import (
 )
 from sim.read import engineering
 from sim.scenario.scenario import Scenario
-from sim.scenario.schema import files_read, keys, model, tables
+from sim.scenario.schema import files_read
 from sim.step.state import MemberNoise, State, Trajectory
+from sim.study.accuracy import (
+    alternatives,
+    changed_part,
+    part_table,
+    step_values,
+    students,
+)
 from sim.units.errors import BadInput
 from sim.units.notation import concise
 
@@ -76,7 +81,6 @@ _WORDS = (
     "the radius",
     "the friction force",
 )
-_BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 #: Shares of the budget that are spent on times and on clock steps; the rest is spent on models and grids.
 _TIMING, _STEPS = 0.15, 0.3
@@ -263,14 +267,16 @@ def converge(
     began = now()
     budget = Budget(now, budget_seconds, began + 0.5 * budget_seconds)
     chosen_models = {
-        "shear": _table(scenario.fluctuations),
-        "bonds": _table(scenario.population),
+        "shear": part_table(scenario.fluctuations),
+        "bonds": part_table(scenario.population),
     }
     base = scenario.with_values(chosen_models | {"record": {}})
-    accepted = tolerance or float(_table(scenario.shear).get("tolerance", 0.01))
+    accepted = tolerance or float(part_table(scenario.shear).get("tolerance", 0.01))
     written = _at_step(base, 1.0)
     settings = [
-        row for changes in _tried(base) if (row := _admitted(*changes, base, budget))
+        row
+        for changes in alternatives(base)
+        if (row := _admitted(*changes, base, budget))
     ]
     building = now() - began
     for row in [*settings, written]:  # compiles, which is not counted
@@ -292,7 +298,7 @@ def converge(
         for row in judged
         if row.members
         and row.part == "bonds"
-        and "sites" not in _table(row.scenario.bonds)
+        and "sites" not in part_table(row.scenario.bonds)
     ]
     # its mean depends on the noise of the bonds, which other models lack
     driven = scenario.drive.solves_motion
@@ -339,40 +345,6 @@ def _members(scenario: Scenario) -> int:
     return scenario.ensemble.members if scenario.is_random else 1
 
 
-def _table(part: object) -> dict[str, Any]:
-    """Return the keys of a part that have a value, as its table in a scenario file."""
-    return dict(TypeAdapter(Any).dump_python(part, by_alias=True, exclude_none=True))
-
-
-def _tried(scenario: Scenario) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the settings of a scene, simple ones first: the part, and the keys of its table that are changed."""
-
-    def tolerances(table: dict[str, Any], usual: tuple[float, ...]) -> list[float]:
-        return sorted({*usual, table.get("tolerance", usual[0])}, reverse=True)
-
-    shear, bonds = _table(scenario.shear), _table(scenario.bonds)
-    if "correlation" in shear:
-        yield "shear", {"model": "mean"}
-        for tolerance in tolerances(shear, _BANDS):
-            yield "shear", {"model": "banded", "tolerance": tolerance}
-        # the same numbers
-        yield "shear", {"model": "mapped" if shear["model"] == "mapped" else "modal"}
-    if "rebinding_rate" not in bonds:
-        return
-    is_carried, is_stretched = bonds.get("area") == "carried", "rupture" in bonds
-    if not (is_stretched or is_carried):
-        yield "bonds", {"model": "steady"}
-    yield "bonds", {"model": "rate"}
-    for tolerance in tolerances(bonds, _COHORTS) if is_stretched else ():
-        yield "bonds", {"model": "cohort", "tolerance": tolerance}
-    density = bonds.get("site_density", math.inf)
-    sites = bonds.get("sites") or density * math.pi * scenario.rest_radius**2
-    last, most = ("tracked", 1e5) if is_stretched else ("counted", 1e9)
-    # sites cannot be carried with the area
-    if not is_carried and ("sites" in bonds or 0.0 < sites <= most):
-        yield "bonds", {"model": last, "sites": round(sites)}
-
-
 def _admitted(
     part: str, changes: dict[str, Any], base: Scenario, budget: Budget
 ) -> Setting | None:
@@ -380,21 +352,14 @@ def _admitted(
 
     If the time is spent, only the setting of the scene itself is built.
     """
-    table_now = _table(getattr(base, part))
+    table_now = part_table(getattr(base, part))
     label = " ".join(map(str, changes.values()))
-    declared = {
-        key
-        for kind in tables(keys(Scenario)[part].annotation).values()
-        if model(kind) == changes["model"]
-        for key in keys(kind)
-    }
     is_written = table_now.items() >= changes.items()
     try:
         if budget.left() < 0.0 and not is_written:
             budget.needs(2.0 * budget.seconds)
             raise ValueError(_TOO_LONG)
-        kept = {key: table_now[key] for key in table_now.keys() & declared}
-        changed = base.with_values({part: kept | changes})
+        changed = base.with_values({part: changed_part(base, part, changes)})
         changed.process  # noqa: B018 - some models are refused only when their modes are made
     except ValueError as fault:
         budget.left_out.append(f"{label}: " + str(fault).partition("\n")[0])
@@ -405,12 +370,9 @@ def _admitted(
 
 def _at_step(scenario: Scenario, ratio: float) -> Setting:
     """Return the scene with its clock step times a power of two and the same records."""
-    clock = scenario.clock
-    step, record = clock.step * ratio, clock.stride * clock.step
-    changed = scenario.with_values(
-        {"clock": {"duration": clock.duration, "step": step, "record": record}}
-    )
-    text = f'step = "{step:.12g} s"\nrecord = "{record:.12g} s"'
+    values = step_values(scenario, ratio)
+    changed, step = scenario.with_values({"clock": values}), values["step"]
+    text = f'step = "{step:.12g} s"\nrecord = "{values["record"]:.12g} s"'
     label = f"step {engineering(step, 's')}"
     return Setting(label, "step", changed, text, int(ratio == 1.0), ratio)
 
@@ -853,11 +815,6 @@ def _trend(changes: Array, numbers: float, members: int, accepted: float) -> str
     if len(changes) == 1:
         return f"{words} {100.0 * last[what, of]:.2g} %, and the next quarter does not fit into the budget"
     return f"{words} {100.0 * before[what, of]:.2g}, then by {100.0 * last[what, of]:.2g} %"
-
-
-def students(members: int | Array, numbers: float = 1.0) -> Any:
-    """Return Student's two-sided 95 % quantile of a mean over members, or of the largest of some ``numbers``."""
-    return special.stdtrit(np.maximum(members - 1.0, 1.0), 1.0 - 0.025 / numbers)
 
 
 class Choice(NamedTuple):

@@ -437,7 +437,10 @@ def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_ho
         (set(), sample()),
         ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
         ({"equilibrium_radius"}, sample(contact=CONTACTS["rate_dependent"])),
-        ({"edge_energy"}, sample(shear=SHEARS["modal on a disc"])),
+        (
+            {"edge_energy", "expected_energy"},
+            sample(shear=SHEARS["modal on a disc"]),
+        ),
         ({"applied_load"}, sample(contact=CONTACTS["load there and back"])),
         (
             {"applied_load", "outer_radius"},

@@ -297,7 +297,7 @@ def test_of_members_that_come_off_at_different_times_the_closed_ones_are_drawn_b
     radius, *_, opened = rendered(
         plots.draw(dataset, "curve", Choices(absolute=True))
     ).axes
-    mean = 1e6 * dataset["contact_area"].where(closed).mean("member").to_numpy()
+    mean = 1e6 * read.over_members(dataset, ["contact_area"])["contact_area"].value
     speed, area = drawn(radius, pictures.BOTH)
     assert_allclose(area, np.where(count > 2, mean, np.nan), rtol=1e-12)
     (cross,) = (line.get_xydata() for line in radius.lines if line.get_marker() == "x")

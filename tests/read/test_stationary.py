@@ -232,7 +232,7 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
     assert result["work_of_adhesion"].value.dims == ("contact_load",) and bool(
         result["speed"].sem.isnull().all()
     )
-    assert result["work_of_adhesion"].unit == "m^2"
+    assert result["work_of_adhesion"].unit == "J/m^2"
 
 
 def squared_ornstein_uhlenbeck(rng, members, records, keep, pairs=5):

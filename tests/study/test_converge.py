@@ -464,7 +464,7 @@ def admitted_rows(scenario):
     budget = study.Budget(lambda: 0.0, 1.0, math.inf)
     rows = [
         study._admitted(*changes, scenario, budget)
-        for changes in study._tried(scenario)
+        for changes in study.alternatives(scenario)
     ]
     return list(filter(None, rows)), budget.left_out
 
@@ -849,11 +849,11 @@ def test_the_recommended_setting_keeps_its_bound_against_the_finest_models_and_a
     rows = {row.label: row for row in admitted_rows(scenario)[0]}
     labels = [str(name) for name in dataset["row"].to_numpy()[list(best.rows)]]
     parts = {
-        rows[name].part: study._table(getattr(rows[name].scenario, rows[name].part))
+        rows[name].part: study.part_table(getattr(rows[name].scenario, rows[name].part))
         for name in labels[:-1]
     }
     finest = {
-        row.part: study._table(getattr(row.scenario, row.part)) for row in rows.values()
+        row.part: study.part_table(getattr(row.scenario, row.part)) for row in rows.values()
     }
     value, unit = labels[-1].split()[1:]
     step, runs = float(value) * {"s": 1.0, "ms": 1e-3, "µs": 1e-6}[unit], []
