@@ -108,6 +108,8 @@ def run(
     BadInput
         If the scenario cannot be used, or the file or an unfinished run of it is there and is neither replaced nor gone
         on with.
+    RuntimeError
+        If the error that the table ``[accuracy]`` accepts is not reached within its budget.
     """
     import logging
 
@@ -118,7 +120,14 @@ def run(
     from sim.units import notebook
     from sim.units.terminal import LOG, Shown, progress_bar, progress_lines
 
-    scene = _scene(scenario)
+    scene, about = _scene(scenario), dict[str, str]()
+    if scene.accuracy is not None:
+        from sim.study.within import Goal, answer
+
+        wanted = scene.accuracy
+        goal = Goal(wanted.within, wanted.of, wanted.budget)
+        scene, sentence, about = answer(scene, goal)
+        LOG.info(sentence)
     plan = Plan.of(scene)
     for remark in remarks(plan) if LOG.isEnabledFor(logging.INFO) else ():
         LOG.info(remark)
@@ -142,6 +151,7 @@ def run(
                 jobs=jobs,
                 progress=bar.advance,
                 stage=bar.begin,
+                about=about,
             )
     except Exception as fault:
         message = str(fault).replace("the same command", "the same call")

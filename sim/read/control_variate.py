@@ -22,10 +22,16 @@ from sim.read.dataset import MEMBERS, STATISTIC
 
 #: Fewest members whose regression has a useful error.
 FEWEST = 8
-#: Largest share of masked members: masking bends the response, which two regressors do not follow.
-MOST_MASKED = 0.05
+#: Standard deviations above its mean up to which ΔΓ must leave adhesion. More than one in a hundred contacts may be
+#: masked else (a single gamma number of shape 1 is larger with the probability e^−5), and masking bends the response.
+_REACH = 4.0
 #: Trajectories that are needed beside the values.
-SOURCES = ("fluctuation_energy", "expected_energy", "in_contact", "masked")
+SOURCES = (
+    "fluctuation_energy",
+    "expected_energy",
+    "in_contact",
+    "work_of_adhesion",
+)
 _NAMES = ("contact_area", "contact_radius", "area_ratio", "friction_force")
 #: Chance with which the square of ΔΓ is used in a response without curvature.
 _FALSE_ALARM = 0.01
@@ -150,7 +156,9 @@ def sources(names: Collection[str]) -> tuple[str, ...]:
 def control_variate(dataset: xr.Dataset) -> ControlVariate | None:
     """Return the control variate of a dataset; None if its field has no known mean, or members are not recorded.
 
-    It is used where no member is open, at most a share ``MOST_MASKED`` of them is masked, and ΔΓ varies.
+    It is used where ΔΓ varies, no member is open, and a contact whose ΔΓ is four standard deviations above its mean
+    still has adhesion. The last condition follows from the known law, because a choice by the masked members of the
+    sample would select samples and so bias the mean.
     """
     if not {*SOURCES, "energy_variation"} <= {*dataset.variables}:
         return None
@@ -166,13 +174,16 @@ def control_variate(dataset: xr.Dataset) -> ControlVariate | None:
     expected = dataset["expected_energy"]
     deviation = energy / expected.where(expected > 0.0) - 1.0
 
-    def share(flags: xr.DataArray) -> xr.DataArray:
-        return flags.mean(MEMBERS) if MEMBERS in flags.dims else flags
+    def average(values: xr.DataArray) -> xr.DataArray:
+        return values.mean(MEMBERS) if MEMBERS in values.dims else values
 
-    is_closed = share(dataset["in_contact"].astype(float)) == 1.0
+    work, mean = dataset["work_of_adhesion"].astype(float), average(deviation)
+    off = deviation - mean
+    slope = average(off * work) / average(off**2)
+    beyond = average(work) + slope * (_REACH * variance**0.5 - mean)
     is_used = (
-        is_closed
-        & (share(dataset["masked"].astype(float)) <= MOST_MASKED)
+        (average(dataset["in_contact"].astype(float)) == 1.0)
+        & (beyond > 0.0)
         & (variance > 0.0)
         & deviation.notnull().all(MEMBERS)
     )

@@ -17,7 +17,7 @@ import itertools
 import json
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy import special
@@ -270,8 +270,8 @@ class Search:
         control, energy = control_variate(dataset), np.zeros(rows[0][2].shape)
         if control is not None and not pilot.drive.solves_motion:
             energy = control.deviation.transpose(MEMBERS, "t").to_numpy()
-        columns = (np.array(column) for column in zip(*rows, strict=True))
-        return Sample(*columns, np.nan_to_num(energy))
+        mean, sem, each = map(np.array, zip(*rows, strict=True))
+        return Sample(mean, sem, each, np.nan_to_num(energy))
 
     def difference(self, sample: Sample, reference: Sample) -> Array:
         """Return bounds of the differences of two samples, shape (quantities,), in units of the largest mean.
@@ -676,19 +676,19 @@ def _searched(scenario: Scenario, goal: Goal) -> tuple[Search, Choice, Choice]:
     NotReached
         If no pilot within the budget shows it.
     """
-    spent, fault = 0.0, NotReached("no pilot was made")
+    spent, fault = 0.0, None
     for pilot in _PILOTS:
         try:
             search = Search(scenario, goal, pilot, spent)
-            try:
-                return search, *search.best()
-            finally:
-                spent = search.spent
+        except NotReached as too_long:
+            raise fault or too_long from None
+        try:
+            return search, *search.best()
         except NotReached as reason:
-            if pilot > _PILOTS[0] and spent == search.spent:
-                raise reason from None
-            fault = reason
-    raise fault
+            fault, spent = reason, search.spent
+        if not search.of_one.any():  # more members show nothing more
+            break
+    raise cast(NotReached, fault)
 
 
 def _known(document: dict[str, Any]) -> dict[str, Any]:

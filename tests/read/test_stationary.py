@@ -217,7 +217,9 @@ def test_statistics_leave_out_missing_values_and_a_distribution_is_over_members_
     assert_allclose(
         result["work_of_adhesion"].value, late.mean(("member", "t")), rtol=1e-13
     )
-    assert_allclose(result["work_of_adhesion"].std, late.std(("member", "t")), rtol=1e-9)
+    assert_allclose(
+        result["work_of_adhesion"].std, late.std(("member", "t")), rtol=1e-9
+    )
     means = late.mean("t")
     assert_allclose(
         result["work_of_adhesion"].sem,

@@ -853,7 +853,8 @@ def test_the_recommended_setting_keeps_its_bound_against_the_finest_models_and_a
         for name in labels[:-1]
     }
     finest = {
-        row.part: study.part_table(getattr(row.scenario, row.part)) for row in rows.values()
+        row.part: study.part_table(getattr(row.scenario, row.part))
+        for row in rows.values()
     }
     value, unit = labels[-1].split()[1:]
     step, runs = float(value) * {"s": 1.0, "ms": 1e-3, "µs": 1e-6}[unit], []

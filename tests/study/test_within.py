@@ -1,0 +1,110 @@
+"""The cheapest run within an error: true errors, the same choice at each call, and refusals."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.commands import sim as command
+from numpy.testing import assert_allclose, assert_array_equal
+
+import sim
+from sim.study.within import Goal, NotReached, Search, answer
+from sim.units.errors import BadInput
+
+LENS = {"clock.duration": "1.2 s", "clock.record": "20 ms"}
+
+
+def lens(**changes):
+    return sim.load("scenarios/pdms_lens.toml", LENS | changes)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return answer(lens(), Goal(0.01))
+
+
+def test_the_choice_is_cheaper_and_the_same_at_each_call(found, monkeypatch):
+    scene, sentence, attributes = found
+    assert scene.fluctuations.model in ("mean", "banded")
+    assert scene.ensemble.members < 256 or scene.fluctuations.model == "mean"
+    assert "within 1 %" in sentence
+    monkeypatch.setattr("time.process_time", lambda: 1e9)  # a machine under load
+    assert answer(lens(), Goal(0.01)) == found
+    errors = json.loads(attributes["accuracy"])["errors"]
+    assert all(one["systematic"] + one["noise"] <= 0.01 for one in errors.values())
+
+
+def test_the_plain_scenario_repeats_the_numbers(found, tmp_path):
+    scene, _, attributes = found
+    assert scene.accuracy is None
+    path = tmp_path / "plain.toml"
+    path.write_text(attributes["accuracy_scenario"])
+    first, again = sim.run(scene), sim.run(path)
+    assert_array_equal(first["contact_area"], again["contact_area"])
+
+
+def test_a_smaller_error_costs_more_members_or_a_finer_model():
+    works = []
+    for within in (0.05, 0.01, 0.003):
+        best, _ = Search(lens(), Goal(within), 32).best()
+        assert best.total <= within
+        works.append(best.work)
+    assert works == sorted(works)
+
+
+def test_a_change_by_moments_of_the_energy_is_that_of_a_cubic():
+    """A response of third degree has the exact change of its mean, from the moments of a gamma number."""
+    search = Search(lens(), Goal(0.01), 32)
+    energy = np.random.default_rng(2).gamma(4.0, 0.25, (32, 1)) - 1.0
+    values = 1.0 + 2.0 * energy - energy**2 + 0.5 * energy**3
+    search.written = search.written._replace(
+        mean=values.mean(axis=0, keepdims=True),
+        energy=energy,
+        members=values[np.newaxis],
+    )
+    moments = np.array([0.0, 0.25, 0.125])  # those of shape 4, less those of none
+    assert_allclose(search._response(0, moments), abs(-0.25 + 0.5 * 0.125), rtol=1e-10)
+
+
+def test_a_scene_without_noise_keeps_its_members_and_needs_no_noise():
+    scene = sim.load("scenarios/masking.toml", {"sweep": {}})
+    result = answer(scene, Goal(0.01))
+    assert result.scenario.ensemble == scene.ensemble
+
+
+def test_each_swept_point_is_in_the_run():
+    scene = sim.load("scenarios/ten_wavelengths.toml")
+    result = answer(scene, Goal(0.02))
+    assert len(result.scenario.points()) == 3
+
+
+def test_a_budget_that_is_too_small_names_one_that_helps():
+    with pytest.raises(NotReached, match="--budget"):
+        answer(lens(), Goal(0.01, (), 1e-6))
+
+
+def test_what_cannot_be_combined_is_refused():
+    with pytest.raises(BadInput, match=r"accuracy\.of"):
+        answer(lens(), Goal(0.01, ("peak_stress",)))
+    with pytest.raises(BadInput, match=r"shear\.field"):
+        answer(sim.load("scenarios/own_map.toml"), Goal(0.01))
+
+
+def test_the_command_prints_the_sentence_and_stores_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = Path(__file__).parents[2].joinpath("scenarios/masking.toml").read_text()
+    Path("scene.toml").write_text(text + '\n[accuracy]\nwithin = "2 %"\n')
+    shown = command("run", "scene.toml").output
+    assert "within 2 %: errors of at most" in shown
+    dataset = sim.open("outputs/scene.nc")
+    assert dataset.attrs["accuracy_sentence"] in shown.replace("\n", " ")
+    assert math.isclose(json.loads(dataset.attrs["accuracy"])["within"], 0.02)
+
+
+@pytest.mark.parametrize("option", ["--of", "--budget"])
+def test_options_without_within_are_refused(option):
+    refused = command("run", "scenarios/masking.toml", option, "1 s")
+    assert refused.exit_code == 2
+    assert "--within" in refused.output
