@@ -801,9 +801,7 @@ def _trend(changes: Array, numbers: float, members: int, accepted: float) -> str
     Noise alone is larger than stated in one study of twenty, though many ``numbers`` are compared.
     """
     last, noise = changes[0]
-    shown = (last > students(members, numbers) * noise) & (
-        _FALL * last > _SMALL * accepted
-    )
+    shown = (last > students(members, numbers) * noise) & (last > _SMALL * accepted)
     before, noise_before = changes[1] if len(changes) > 1 else (last, noise)
     grown = np.where(
         shown & (before - last <= np.hypot(noise, noise_before)), last, 0.0

@@ -55,6 +55,10 @@ _PILOTS, _FEWEST, _MOST = (32, 128, 512, 2048), 8, 10**6
 _RATIOS, _FALL = tuple(4.0**power for power in range(2, -5, -1)), 2.0
 #: Change of the last clock step over the accepted error that is small enough, and points of a sweep that are tried.
 _SMALL, _POINTS = 0.1, 3
+#: Models without noise, of which the last that a scene admits stands for a random one.
+_NOISELESS = ("mean", "rate", "cohort")
+#: Work of a run over that of its pilots beyond which larger pilots may find a cheaper run.
+_WORTH_MORE = 4.0
 #: Chance that the noise of a pilot is larger than estimated.
 _UNSURE = 0.2
 #: Errors below this are roundings.
@@ -359,15 +363,29 @@ class Search:
 
     @property
     def is_of_moment(self) -> bool:
-        """True if members differ by the ΔΓ of the moment, of known law, so that shear models differ by that law alone.
+        """True if ΔΓ has a known law or no noise, and the motion is prescribed.
 
-        The contact has no memory then, and neither fluctuations nor clock steps have errors in time but by the bonds
-        and the amplitude.
+        Shear models then differ by the law of ΔΓ alone. The contact has no memory, so that random parts have no error
+        in time that their means have not.
         """
         return all(
-            point.knows_energy and not (point.contact.lags or point.feels_steps)
+            (point.knows_energy or not point.fluctuations.per_member)
+            and not (
+                point.drive.solves_motion or point.contact.lags or point.feels_steps
+            )
             for point in self.scene.points()
         )
+
+    @property
+    def _smooth(self) -> dict[str, Any]:
+        """Return the finest models without noise of parts that are random, with which clock steps are compared."""
+        result = dict[str, Any]()
+        if not self.is_of_moment:
+            return result
+        for part, changes in alternatives(self.scene):
+            if part in _random(self.scene) and changes["model"] in _NOISELESS:
+                result[part] = changed_part(self.scene, part, changes)
+        return result
 
     def _by_response(
         self, admitted: list[tuple[str, dict[str, Any], Scenario]]
@@ -420,9 +438,7 @@ class Search:
         fit into the budget. The rest of a series that falls by ``_FALL`` from quarter to quarter is its last change.
         """
         rows = list[tuple[float, dict[str, Any], Sample]]()
-        scene, smooth = self.scene, dict[str, Any]()
-        if self.is_of_moment:  # fluctuations would only add noise
-            smooth = {"shear": changed_part(self.scene, "shear", {"model": "mean"})}
+        scene, smooth = self.scene, self._smooth  # noise hides the errors of steps
         for ratio in _RATIOS:
             with contextlib.suppress(ValueError):
                 values = {"clock": step_values(self.scene, ratio)}
@@ -677,18 +693,27 @@ def _searched(scenario: Scenario, goal: Goal) -> tuple[Search, Choice, Choice]:
         If no pilot within the budget shows it.
     """
     spent, fault = 0.0, None
+    result: tuple[Search, Choice, Choice] | None = None
     for pilot in _PILOTS:
+        before = spent
         try:
             search = Search(scenario, goal, pilot, spent)
         except NotReached as too_long:
-            raise fault or too_long from None
-        try:
-            return search, *search.best()
-        except NotReached as reason:
-            fault, spent = reason, search.spent
-        if not search.of_one.any():  # more members show nothing more
+            fault = fault or too_long
             break
-    raise cast(NotReached, fault)
+        try:
+            best, as_written = search.best()
+            if result is None or best.work < result[1].work:
+                result = search, best, as_written
+        except NotReached as reason:
+            fault = reason
+        spent = search.spent
+        is_cheap = result and result[1].work < _WORTH_MORE * (spent - before)
+        if is_cheap or not search.of_one.any():  # noise of pilots decides nothing more
+            break
+    if result is None:
+        raise cast(NotReached, fault)
+    return result
 
 
 def _known(document: dict[str, Any]) -> dict[str, Any]:

@@ -6,11 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.accuracy_scenes import SCENES, SPRINGS, accuracy_scene
 from helpers.commands import sim as command
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
-from sim.study.within import Goal, NotReached, Search, answer
+from sim.read.statistics import over_members
+from sim.study.accuracy import alternatives, changed_part, step_values
+from sim.study.within import USUAL, Goal, NotReached, Search, answer
 from sim.units.errors import BadInput
 
 LENS = {"clock.duration": "1.2 s", "clock.record": "20 ms"}
@@ -108,3 +111,55 @@ def test_options_without_within_are_refused(option):
     refused = command("run", "scenarios/masking.toml", option, "1 s")
     assert refused.exit_code == 2
     assert "--within" in refused.output
+
+
+def _means(scene):
+    """Return means and standard errors over the members of each quantity, behind springs of the second half."""
+    dataset = sim.run(scene)
+    result = {}
+    for name, one in over_members(dataset, USUAL, quantiles=False).items():
+        mean = one.value.to_numpy()
+        sem = np.zeros(mean.shape) if one.sem is None else one.sem.to_numpy()
+        if scene.drive.solves_motion:
+            late = dataset[name].isel(t=slice(dataset.sizes["t"] // 2, None))
+            each = np.atleast_1d(late.mean("t").to_numpy())
+            mean, sem = each.mean(keepdims=True), np.zeros(1)
+            if len(each) > 1:
+                sem = each.std(ddof=1, keepdims=True) / math.sqrt(len(each))
+        result[name] = mean, np.nan_to_num(sem)
+    return result
+
+
+def _finest(scene):
+    """Return the scene with its finest models, a much finer clock step, many members and another seed."""
+    values = {
+        part: changed_part(scene, part, changes)
+        for part, changes in alternatives(scene)
+    }
+    is_driven = scene.drive.solves_motion
+    clock = step_values(scene, 1.0 / 16.0 if is_driven else 1.0 / 64.0)
+    members = 512 if is_driven else 8192
+    return scene.with_values(
+        values | {"clock": clock, "ensemble.members": members, "seed": 99}
+    )
+
+
+@pytest.mark.verify
+def test_the_true_error_is_within_the_target():
+    """The reference's own error (four standard errors) is at most a third of the smallest target of its scene."""
+    held = list[bool]()
+    for name in SCENES:
+        scene = sim.load(accuracy_scene(name))
+        reference = _means(_finest(scene))
+        has_field = scene.fluctuations.per_member
+        targets = (0.05, 0.01) if name in SPRINGS and has_field else (0.05, 0.01, 0.003)
+        for target in targets:
+            means = _means(answer(scene, Goal(target, (), 300.0)).scenario)
+            for quantity, (mean, sem) in reference.items():
+                unit = np.abs(mean).max()
+                if unit > 0.0:
+                    assert 4.0 * sem.max() < min(targets) * unit / 3.0, (name, quantity)
+                    off = np.abs(means[quantity][0] - mean).max()
+                    held.append(bool(off <= target * unit))
+    assert len(held) > 100
+    assert np.mean(held) >= 0.95
