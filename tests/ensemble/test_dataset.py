@@ -428,9 +428,9 @@ def test_every_variable_has_unit_and_long_name_and_stands_where_its_condition_ho
         "sim_version",
     }
     bell = {"bonds": BONDS["rate, bell"]}
-    known = {"expected_energy"}  # of a prescribed motion
+    known = {"masked", "expected_energy"}  # with adhesion, and of a prescribed motion
     driven, stage, runaway = (
-        set(READINGS) - {"unresolved_time"},
+        {*READINGS, "masked"} - {"unresolved_time"},
         {"stage_position", "stage_speed"},
         {"runaway_time"},
     )
