@@ -2,8 +2,8 @@
 
 The *error* of a quantity is its difference from the finest admissible models of the scene, in the limit of fine clock
 steps and many members. Of a quantity over time it is the largest difference of the mean over the members, over the
-largest absolute mean of the run. Of a share it is the difference itself. The total is the bound of the systematic part
-plus the bound of the noise at all recorded times together (95 %).
+largest absolute mean of the run, at each point of a sweep. Of a share it is the difference itself. The total is the
+bound of the systematic part plus the bound of the noise at all recorded times together (95 %).
 
 A *pilot* of a few members runs the scene at each setting and compares it with the finest one. Settings are chosen by
 their counted work, the same on any machine, so the choice is, too. Differences of single changes are added up. Before
@@ -54,7 +54,7 @@ _PILOTS, _FEWEST, _MOST = (32, 128, 512, 2048), 8, 10**6
 #: the lowest order p = 1/2.
 _RATIOS, _FALL = tuple(4.0**power for power in range(2, -5, -1)), 2.0
 #: Change of the last clock step over the accepted error that is small enough, and points of a sweep that are tried.
-_SMALL, _POINTS = 0.1, 3
+_SMALL, _POINTS = 0.1, 16
 #: Models without noise, of which the last that a scene admits stands for a random one.
 _NOISELESS = ("mean", "rate", "cohort")
 #: Work of a run over that of its pilots beyond which larger pilots may find a cheaper run.
@@ -198,14 +198,18 @@ class Search:
             needed = engineering(10.0 * self._needed(self.scene), "s")
             raise NotReached(f'a pilot exceeds the budget; give --budget "{needed}"')
         self.written = sample
-        unit = np.abs(sample.mean).max(axis=1)
+        by_point = np.abs(sample.mean).reshape(len(self.names), self.points, -1)
+        unit = np.broadcast_to(by_point.max(axis=2, keepdims=True), by_point.shape)
         is_share = [QUANTITIES[name].form is Form.SHARE for name in self.names]
-        self.unit = np.where(is_share, 1.0, unit)
+        #: Largest mean at each point of the sweep, at all its numbers; 1 for shares.
+        self.unit = np.where(
+            np.array(is_share)[:, np.newaxis], 1.0, unit.reshape(sample.mean.shape)
+        )
         free = self.pilot - 1.0
         unsure = math.sqrt(free / float(special.chdtri(free, 1.0 - _UNSURE)))
         #: Standard error of a single member, as large as the pilot allows [1].
         self.of_one = (
-            self._in_units(sample.sem.max(axis=1)) * math.sqrt(self.pilot) * unsure
+            self._in_units(sample.sem).max(axis=1) * math.sqrt(self.pilot) * unsure
         )
 
     def _with(self, scenario: Scenario, values: dict[str, Any]) -> Scenario:
@@ -290,10 +294,10 @@ class Search:
             of_pairs < apart, paired.mean(axis=1), sample.mean - reference.mean
         )
         bound = np.abs(off) + students(self.pilot) * np.minimum(of_pairs, apart)
-        return self._in_units(bound.max(axis=1))
+        return self._in_units(bound).max(axis=1)
 
     def _in_units(self, values: Array) -> Array:
-        """Return values over the largest mean of the run; 0 for roundings."""
+        """Return values over the largest mean of the run at their point of the sweep; 0 for roundings."""
         result = np.divide(
             values, self.unit, out=np.zeros(values.shape), where=self.unit > 0.0
         )
@@ -402,14 +406,17 @@ class Search:
         ]
         for (label, values, scene), law in zip(admitted, laws, strict=True):
             off = [self._response(k, law[k] - laws[-1][k]) for k in range(len(law))]
-            error = self._in_units(np.max(off, axis=0))
+            error = self._in_units(np.concatenate(off, axis=1)).max(axis=1)
             result.append(
                 Setting(label, values, error, *_counted_step(scene), _random(scene))
             )
         return result
 
     def _response(self, point: int, moments: Array) -> Array:
-        """Return bounds of the change of the means by changes of the first three moments, shape (quantities,)."""
+        """Return bounds of the change of the means by changes of the first three moments at a point of the sweep.
+
+        They have the shape (quantities, numbers of the point).
+        """
         size = self.written.mean.shape[1] // self.points
         at = slice(point * size, (point + 1) * size)
         energy, members = self.written.energy[:, at], self.written.members[:, :, at]
@@ -422,7 +429,7 @@ class Search:
             spread_of = np.sqrt(np.sum(residual**2, axis=1) / (self.pilot - 4.0))
             noise = students(self.pilot - 3) * spread_of * np.linalg.norm(weights)
             changes[:, k] = np.abs(members[:, :, k] @ weights) + noise
-        return np.asarray(changes.max(axis=1))
+        return changes
 
     def _too_long(self, scene: Scenario) -> NotReached:
         needed = engineering(2.0 * (self.spent + 3.0 * self._needed(scene)), "s")
@@ -628,7 +635,8 @@ def _words(part: str, changes: dict[str, Any]) -> str:
 
 
 def _percent(error: float) -> str:
-    return f"{100.0 * error:.2g} %"
+    """Return an error with two digits, and one that is as large as the quantity without digits."""
+    return f"{100.0 * error:.2g} %" if error < 0.995 else f"{100.0 * error:,.0f} %"
 
 
 class Answer(NamedTuple):
@@ -663,6 +671,9 @@ def answer(scenario: Scenario, goal: Goal) -> Answer:
     settings = [*best.labels] or ["settings as written"]
     if best.noise.any():
         settings.append(f"{best.members:,} members")
+    count = len(scene.points())
+    if search.points < count:
+        settings.append(f"judged at {search.points} of {count} points of the sweep")
     as_written = _percent(written_choice.total)
     sentence = (
         f"within {_percent(goal.within)}: errors of at most {', '.join(parts)}; "
