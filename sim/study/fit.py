@@ -73,7 +73,7 @@ _OTHER_UNIT = 100.0
 #: Residual beyond which the best curve does not reach a point.
 _FAR = 3.0
 #: Tables of keys that are not physical.
-_OTHER = ("clock", "record", "ensemble", "seed", "instrument")
+_OTHER = ("clock", "record", "ensemble", "seed", "instrument", "jump_in")
 #: Rises of chi^2 in the figure of a profile, over that at the ends of an interval.
 _SHOWN = 10.0
 #: Half width of an interval over the value, beyond which the data hardly fix a value.
@@ -486,6 +486,7 @@ def _remarks(result: Fit) -> Iterator[str]:
     yield from _deciding(result)
     yield from _heavy(problem, result.best)
     yield from _unreached(problem, result.best)
+    yield from _missed_jumps(problem, result.best)
     yield from _one_sided(problem, result.best)
     for number, name in enumerate(problem.names):
         here = problem.curve == number
@@ -570,6 +571,15 @@ def _unreached(problem: Problem, best: Minimum) -> Iterator[str]:
             places = ", ".join(map(problem.place, rows[:_MOST_ROWS]))
             more = ", ..." * (rows.size > _MOST_ROWS)
             yield f"the best curve does not reach {rows.size} points, where its contact is {words}: {places}{more}"
+
+
+def _missed_jumps(problem: Problem, best: Minimum) -> Iterator[str]:
+    """Yield the readings at the jump into contact that the best curve misses by more than their errors."""
+    for row, off in zip(_jumps(problem, best), problem.off_jumps(best.x), strict=True):
+        if abs(off) > _FAR:
+            place, read, at = row["jump into contact"], row["reading"], row["fit"]
+            cause = "the sphere closes elsewhere than in the model, or the error is too small"
+            yield f"the jump into contact is missed by {abs(off):.2g} errors: {place} is {read}, not {at}; {cause}"
 
 
 def _one_sided(problem: Problem, best: Minimum) -> Iterator[str]:
@@ -877,6 +887,8 @@ def carried_out(
     shown: list[Printed] = [(_table(result), below)]
     if result.differences:
         shown.append((_differences(result), ""))
+    if result.problem.jumps:
+        shown.append((_jumps(result.problem, result.best), ""))
     shown += [(_profile(result, profile), "") for profile in result.profiles]
     if verdict is not None:
         doubt = "; but even the unchanged scenario misses the data, so perhaps none of these is true"
@@ -926,6 +938,22 @@ def _profile(fit: Fit, profile: ZeroProfile) -> list[dict[str, str]]:
         }
         first = {profile.key: values.pop(profile.key), "chi^2": f"{chi_square:.4g}"}
         rows.append(first | values)
+    return rows
+
+
+def _jumps(problem: Problem, best: Minimum) -> list[dict[str, str]]:
+    """Return one row for each reading at a jump into contact, with that of the best curve."""
+    rows = []
+    for (k, jump), value in zip(
+        problem.jumps, problem.predicted_jumps(best.x).tolist(), strict=True
+    ):
+        unit = "m" if jump.name == "displacement" else "N"
+        factor, shown = scaled(jump.value, unit)
+        stem = f"{problem.tables[k].stem}, " * (len(problem.tables) > 1)
+        row = {"jump into contact": f"{stem}{jump.name}"}
+        row["reading"] = f"{concise(factor * jump.value, factor * jump.error)} {shown}"
+        row["fit"] = f"{factor * value:.6g} {shown}"
+        rows.append(row)
     return rows
 
 
@@ -1040,6 +1068,18 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
                 "numbers": dict(zip(fit.values, item.numbers.T.tolist(), strict=True)),
             }
             for item in fit.profiles
+        ]
+    if fit.problem.jumps:
+        readings = zip(
+            fit.problem.jumps, fit.problem.predicted_jumps(fit.best.x), strict=True
+        )
+        result["jumps_into_contact"] = [
+            {
+                "table": fit.problem.tables[k].stem,
+                **jump._asdict(),
+                "fit": float(value),
+            }
+            for (k, jump), value in readings
         ]
     if verdict is not None:
         judged = [item._asdict() for item in verdict.judged]
