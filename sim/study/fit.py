@@ -520,7 +520,7 @@ def _loose(result: Fit) -> Iterator[str]:
 
 
 def _deciding(result: Fit) -> Iterator[str]:
-    """Yield the keys whose value with a zero held at its start lies outside the interval with the zero free."""
+    """Yield the physical keys whose value with a zero held at its start lies outside their interval."""
     for profile in result.profiles:
         k = [item.free.key for item in result.numbers].index(profile.key)
         zero = result.numbers[k].free
@@ -528,7 +528,8 @@ def _deciding(result: Fit) -> Iterator[str]:
         moved = []
         for item, value in zip(result.numbers, profile.numbers[held], strict=True):
             low, high = item.interval[:2]
-            if item.free.key != profile.key and not low <= value <= high:
+            is_zero = item.free.name.startswith("zero.")
+            if not is_zero and not low <= value <= high:
                 text = engineering(float(value), item.free.quantity.unit)
                 _, interval, unit = item.texts
                 words = f"{item.free.key} is {text}, not {interval} {unit}"
@@ -958,37 +959,40 @@ def _jumps(problem: Problem, best: Minimum) -> list[dict[str, str]]:
 
 
 def zero_figure(fit: Fit) -> Figure:
-    """Draw for each free zero the least chi^2 over it, with the rise of a 95 % interval, and the other values there."""
+    """Draw for each free zero the least chi^2 over it, with the rise of a 95 % interval, and the physical values there.
+
+    All zeros share the scales of the values, so that the steepness tells which of them decides.
+    """
+    keys = [item.free.key for item in fit.numbers]
+    physical = [k for k, key in enumerate(keys) if not key.startswith("zero.")]
+    least = fit.best.chi_square
+    rise = float(stats.chi2.ppf(LEVEL, 1))
     with mpl.rc_context(style.STYLE):
-        rows, columns = len(fit.numbers), len(fit.profiles)
-        size = 3.4 * columns, 1.5 * rows
-        picture = Figure(figsize=size, layout="constrained")
-        axes = picture.subplots(rows, columns, sharex="col", squeeze=False)
-        for column, profile in zip(axes.T, fit.profiles, strict=True):
-            keys = [item.free.key for item in fit.numbers]
+        rows, columns = 1 + len(physical), len(fit.profiles)
+        picture = Figure(figsize=(3.4 * columns, 1.5 * rows), layout="constrained")
+        shared: Any = {"sharex": "col", "sharey": "row", "squeeze": False}
+        axes = picture.subplots(rows, columns, **shared)
+        places = []
+        for profile, panel in zip(fit.profiles, axes[0], strict=True):
             own = fit.numbers[keys.index(profile.key)]
             x = Unit.of(profile.values, own.free.quantity.unit, False)
-            first, *others = column
-            first.plot(x.factor * profile.values, profile.chi_squares, ".-", color=BOTH)
-            rise = fit.best.chi_square + stats.chi2.ppf(LEVEL, 1)
-            first.axhline(rise, **style.GUIDE)
-            # far from the minimum chi^2 would hide what it does near it
-            first.set_ylim(
-                2.0 * fit.best.chi_square - rise,
-                fit.best.chi_square + _SHOWN * (rise - fit.best.chi_square),
-            )
-            first.set_ylabel("$\\chi^2$")
-            rest = [k for k, key in enumerate(keys) if key != profile.key]
-            for panel, k in zip(others, rest, strict=True):
-                quantity, values = fit.numbers[k].free.quantity, profile.numbers[:, k]
-                y = Unit.of(values, quantity.unit, False)
-                panel.plot(
-                    x.factor * profile.values, y.factor * values, ".-", color=BOTH
-                )
-                panel.set_ylabel(y.label(keys[k].split(".")[-1].replace("_", " ")))
-            for panel in column:
-                panel.axvline(x.factor * own.value, **style.GUIDE)
-            column[-1].set_xlabel(x.label(profile.key.replace("_", " ")))
+            places.append(x.factor * profile.values)
+            panel.plot(places[-1], profile.chi_squares, ".-", color=BOTH)
+            panel.axhline(least + rise, **style.GUIDE)
+            for below in axes[:, len(places) - 1]:
+                below.axvline(x.factor * own.value, **style.GUIDE)
+            axes[-1, len(places) - 1].set_xlabel(x.label(profile.key))
+        # far from the minimum chi^2 would hide what it does near it
+        axes[0, 0].set_ylim(least - rise, least + _SHOWN * rise)
+        axes[0, 0].set_ylabel("$\\chi^2$")
+        for k, panels in zip(physical, axes[1:], strict=True):
+            values = [profile.numbers[:, k] for profile in fit.profiles]
+            unit = fit.numbers[k].free.quantity.unit
+            y = Unit.of(np.concatenate(values), unit, False)
+            for panel, place, line in zip(panels, places, values, strict=True):
+                panel.plot(place, y.factor * line, ".-", color=BOTH)
+            name = keys[k].split(".")[-1].replace("_", " ")
+            panels[0].set_ylabel(y.label(name))
         return picture
 
 

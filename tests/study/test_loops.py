@@ -16,7 +16,7 @@ from sim.ensemble.steady import history_at_rest, jump_into_contact
 from sim.scenario.files import written as toml
 from sim.scenario.reader import load
 from sim.study import likelihood
-from sim.study.fit import fit, free_number
+from sim.study.fit import fit, free_number, zero_figure
 from sim.study.likelihood import minimum, problem_of
 from sim.study.noise import Noise, noise_of
 from sim.units.errors import BadInput
@@ -492,3 +492,22 @@ def test_a_jump_is_refused_under_a_load_and_without_a_history_and_for_other_file
     plain.write_text("t [s], normal_load [nN]\n0, 1\n1, 2\n", encoding="utf-8")
     with pytest.raises(BadInput, match="jump_in: needs the history of a loop"):
         likelihood.read(plain, load(rest))
+
+
+@pytest.mark.verify
+def test_the_made_up_loop_gives_the_numbers_with_which_it_was_made_and_draws_its_profiles():
+    path = Path(__file__).parents[2] / "scenarios" / "measured_loop.toml"
+    free = [*TRUTH, *ZEROS, "zero.load_drift=-1 nN/s:1 nN/s"]
+    result = fit(load(path), [path.with_suffix(".txt")], free)
+    for key, truth in (TRUTH | WHERE | {"zero.load_drift": 20e-12}).items():
+        low, high = result.intervals[key]
+        assert low < truth < high, key
+    axes = np.reshape(zero_figure(result).axes, (1 + len(TRUTH), 3))
+    for column, profile in zip(axes.T, result.profiles, strict=True):
+        # the rows below that of chi^2 are those of the physical keys
+        for k, panel in enumerate(column[1:]):
+            drawn = panel.get_lines()[1].get_ydata()
+            ratio = drawn / profile.numbers[:, k]
+            assert_allclose(ratio, ratio[0], rtol=1e-12)
+    spans = np.ptp([profile.numbers[:, 0] for profile in result.profiles], axis=1)
+    assert spans[0] > 10.0 * spans[1:].max()  # the zero of the displacement decides
