@@ -41,7 +41,9 @@ verify:
 
 # Packages that results are compared with, such as Adhesion by one file. None of their dependencies is installed beside those named here, because the
 # comparisons need no others.
-PEERS = 'Adhesion>=0.93' 'tamaas>=2.9' 'gstools>=1.7' gstools-cython hankel emcee pyevtk meshio 'stochastic-arrow>=1.1' six
+PEERS = 'Adhesion>=0.93' 'tamaas>=2.9' 'gstools>=1.7' gstools-cython hankel emcee pyevtk meshio 'stochastic-arrow>=1.1' six \
+  'ContactMechanics>=1.8' 'SurfaceTopography>=1.27' NuMPI muGrid muTimer numpyencoder DiscoverVersion array-api-compat defusedxml igor2 olefile \
+  openpyxl xmltodict
 .verify-laws .verify-runs: $(VENV)/.peers
 $(VENV)/.peers: $(STAMP) Makefile
 	PATH="$$PATH:$(BIN)" uv pip install -q --python $(BIN)/python --no-deps $(PEERS) || \

@@ -28,7 +28,7 @@ from sim import laws, read
 from sim.read import Estimate, concise, distribution, over_members
 from sim.read.events import incipient_law
 from sim.solid import HalfSpace, Layer
-from sim.study.fit import Fit, figure as fitted
+from sim.study.fit import Fit, figure as fitted, zero_figure
 from sim.study.likelihood import LEVEL
 from sim.study.mechanisms import WHOLE
 from sim.study.plan import Plan, figure as planned
@@ -87,7 +87,8 @@ class Entry(NamedTuple):
     ``changes`` are overrides of the scenario, ``kind`` is that of the figure, ``where`` the values of swept keys that
     it shows, ``units`` some of its axes and ``choices`` further options; ``name`` is that of the picture. With ``free``
     keys the scenario is fitted to the table of its name, and ``numbers`` reads the fit. With a table of
-    ``points`` as well, ``numbers`` reads the plan of a measurement.
+    ``points`` as well, ``numbers`` reads the plan of a measurement. A fit of the kind ``zero`` reads a file of an
+    instrument, and its figure is the profile of the free zeros.
     """
 
     name: str
@@ -109,14 +110,20 @@ class Entry(NamedTuple):
         return FOLDER / f"{self.name}.{'gif' if self.kind == 'movie' else 'png'}"
 
     @property
+    def table(self) -> Path:
+        """The table to which the scenario is fitted."""
+        suffix = "txt" if self.kind == "zero" else "csv"
+        return ROOT / "scenarios" / f"{self.scenario}.{suffix}"
+
+    @property
     def commands(self) -> list[str]:
         """Commands that give the figure at a terminal."""
         path = f"scenarios/{self.scenario}"
         if self.free:
-            free = "".join(f" --free {key}" for key in self.free)
-            table = (
-                f"--plan scenarios/{self.points}.csv" if self.points else f"{path}.csv"
-            )
+            free = "".join(f" --free {shlex.quote(key)}" for key in self.free)
+            table = f"scenarios/{self.table.name}"
+            if self.points:
+                table = f"--plan scenarios/{self.points}.csv"
             return [f"sim fit {path}.toml {table}{free} -o outputs/{self.name}"]
         options = "".join(
             f" --set '{key}={_toml(value)}'" for key, value in self.changes.items()
@@ -142,13 +149,15 @@ class Entry(NamedTuple):
         if self.points:
             return sim.plan(path, path.with_name(f"{self.points}.csv"), self.free)
         if self.free:
-            return sim.fit(path, path.with_suffix(".csv"), self.free)
+            return sim.fit(path, self.table, self.free)
         return sim.run(sim.load(path, dict(self.changes)))
 
     def figure(self, result: Any, to: Path | None = None) -> Figure:
         """Return the figure of the question, and save it if asked."""
         if self.points:
             return planned(result)
+        if self.kind == "zero":
+            return zero_figure(result)
         if self.free:
             return fitted(result.problem, result.best)
         chosen: Any = {"where": dict(self.where), "units": self.units, **self.choices}
@@ -1021,6 +1030,37 @@ def thin_film(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 @asks(
+    "soft_bead",
+    "How wrong is the parabola for a sphere whose contact is almost half as wide as itself?",
+    """By {rest:.1f} % of the area without a load, where the contact radius is {share:.2f} of the sphere's. JKR's theory
+    takes a parabola, which rises less than the sphere, so that its contact is too large (black). At {load:g} µN the
+    area is {pressed:.1f} % too large, and `sim check` states this largest error, {stated:.1f} %, before the run. The
+    pull-off differs less: the sphere bears {circle:.2f} µN of tension and the parabola {parabola:.2f} µN, because
+    the contact has shrunk by then. Both profiles have large strains, which are neglected.""",
+    kind="loop",
+)
+def soft_bead(dataset: xr.Dataset) -> dict[str, Number]:
+    area, load = dataset["contact_area"], dataset["normal_load"].isel(sphere_profile=0)
+    parabola, circle = (
+        area.sel(sphere_profile=name) for name in ("parabola", "circle")
+    )
+    over = 100.0 * (parabola / circle - 1.0)
+    rest = nearest(load, 0.0)
+    radius = dataset["contact_radius"].isel(sphere_profile=1, t=rest)
+    pull = -1e6 * dataset["lowest_load"]
+    scene = sim.load(ROOT / "scenarios" / "soft_bead.toml", {"sweep": {}})
+    return {
+        "rest": float(over[rest]),
+        "share": float(radius / dataset["sphere_radius"]),
+        "load": 1e6 * float(load[0]),
+        "pressed": float(over[0]),
+        "stated": 100.0 * scene.limits.parabola,
+        "parabola": float(pull[0]),
+        "circle": float(pull[1]),
+    }
+
+
+@asks(
     "peeling",
     "How much larger is the pull-off force if the edge cannot follow?",
     """If the edge runs at {fast:g} mm/s at twice the work of adhesion, the largest pull is {quick:.2f} mN. At
@@ -1123,6 +1163,47 @@ def jkr_fit(fit: Fit) -> dict[str, Number]:
         "softest": contact * young.interval.low,
         "stiffest": contact * young.interval.high,
         "together": float(fit.correlations[0, 1]),
+    }
+
+
+@asks(
+    "measured_loop",
+    "How stiff is a soft solid if the instrument does not know where the sphere touches?",
+    """Young's modulus is {modulus} kPa, with {level:g} % confidence between {softest:.0f} and {stiffest:.0f}. The work
+    of adhesion is {work} mJ/m², between {least:.1f} and {most:.1f}. The fit finds where the sphere touches, at a
+    reading of {zero} µm. With this zero held at the first guess, {guess:g} µm, the modulus would be {wrong:.0f} kPa, so
+    that the zero decides. The zero of
+    the load and its drift hardly move the other values (middle and right). The measurement,
+    [measured_loop.txt](../../scenarios/measured_loop.txt), is made up. The scenario names the true values, and all of
+    them lie in the intervals. A datum of the [jump into contact](../loops.md#the-jump-into-contact) would narrow the
+    zero.""",
+    kind="zero",
+    free=(
+        "solid.youngs_modulus",
+        "adhesion.work",
+        "contact.front_speed",
+        "contact.front_exponent",
+        "zero.displacement=2.2 um:2.8 um",
+        "zero.load=-20 nN:20 nN",
+        "zero.load_drift=-1 nN/s:1 nN/s",
+    ),
+)
+def measured_loop(fit: Fit) -> dict[str, Number]:
+    modulus, work, *_ = fit.numbers
+    profile = fit.profiles[0]
+    guess = fit.numbers[4].free.start
+    held = int(np.argmin(np.abs(profile.values - guess)))
+    return {
+        "modulus": (1e-3 * modulus.value, 1e-3 * modulus.error),
+        "level": 100.0 * LEVEL,
+        "softest": 1e-3 * modulus.interval.low,
+        "stiffest": 1e-3 * modulus.interval.high,
+        "work": (1e3 * work.value, 1e3 * work.error),
+        "least": 1e3 * work.interval.low,
+        "most": 1e3 * work.interval.high,
+        "zero": (1e6 * fit.numbers[4].value, 1e6 * fit.numbers[4].error),
+        "guess": 1e6 * guess,
+        "wrong": 1e-3 * float(profile.numbers[held, 0]),
     }
 
 

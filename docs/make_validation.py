@@ -8,6 +8,7 @@ import importlib.metadata
 import importlib.util
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import integrate, stats
 
 import sim
-from sim.laws import cohesive, jkr
+from sim.laws import cohesive, jkr, layer
 from sim.plots import style
 from sim.solid import HalfSpace
 from sim.spectrum.families import Gaussian, VonKarman
@@ -416,6 +417,47 @@ def finite_range() -> Comparison:
     )
 
 
+def layer_under_waves() -> Comparison:
+    """Compare the normal displacement of a layer under waves of pressure with that in the package ContactMechanics."""
+    with warnings.catch_warnings():
+        # the package says that it runs without MPI
+        warnings.simplefilter("ignore", ImportWarning)
+        from ContactMechanics import PeriodicFFTElasticHalfSpace
+
+    thickness, shear_modulus, side, count = 2e-6, 1.6e6, 40e-6, 256
+    # the mean displacement of an incompressible layer, which a scalar of numpy makes infinite, is zero
+    with np.errstate(divide="ignore"):
+        peer = PeriodicFFTElasticHalfSpace(
+            (count, count),
+            3.0 * shear_modulus,
+            (side, side),
+            thickness=thickness,
+            poisson=np.float64(0.5),
+        )
+    # the first axis is the one of which only half of the waves are stored
+    theirs = np.real(peer.greens_function)
+    half, whole = (np.arange(size) for size in theirs.shape)
+    around = np.minimum(whole, count - whole)
+    q = 2.0 * math.pi / side * np.hypot(half[:, np.newaxis], around)
+    order = np.argsort(q, axis=None)[1:]
+    radial, other = q.ravel()[order], theirs.ravel()[order]
+    ours = layer.normal(radial * thickness) / (shear_modulus * radial)
+    off = float(np.max(np.abs(ours / other - 1.0)))
+    # sinh 2x - 2x of the other source loses digits at the smallest x = qh
+    digits = 2.0 * np.finfo(float).eps * 6.0 / (2.0 * radial[0] * thickness) ** 2
+    return Comparison(
+        "ContactMechanics",
+        "displacement of an incompressible layer under waves of pressure",
+        off,
+        float(digits) + 16.0 * np.finfo(float).eps,
+        False,
+        1e-6 * radial,
+        1e12 * ours,
+        1e12 * other,
+        "wavenumber (rad/µm), compliance (µm/MPa)",
+    )
+
+
 #: All comparisons, in the order of the table. Those with packages of ``make verify`` follow those without.
 COMPARISONS: tuple[Callable[[], Comparison], ...] = (
     shared_force,
@@ -425,6 +467,7 @@ COMPARISONS: tuple[Callable[[], Comparison], ...] = (
     fields,
     counted_bonds,
     finite_range,
+    layer_under_waves,
 )
 
 
@@ -456,7 +499,7 @@ def main() -> None:
     results = [comparison() for comparison in COMPARISONS]
     with mpl.rc_context(style.STYLE):
         figure, panels = mpl.pyplot.subplots(
-            2, 4, figsize=(9.6, 4.6), layout="constrained"
+            3, 3, figsize=(7.8, 6.6), layout="constrained"
         )
         for panel, item in zip(panels.flat, results, strict=False):
             _panel(panel, item)

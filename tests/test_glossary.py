@@ -3,6 +3,9 @@
 import re
 from pathlib import Path
 
+from sim.scenario.scenario import Scenario
+from sim.scenario.schema import all_tables, declaration, keys, tables
+
 DOCS = Path(__file__).parent.parent / "docs"
 GLOSSARY = (DOCS / "glossary.md").read_text(encoding="utf-8")
 #: Pages that a program makes, and pages that show a file of the folder above or the interface of Python.
@@ -53,6 +56,35 @@ def test_a_symbol_has_one_meaning_and_its_keys_and_variables_exist():
     for row in rows():
         for name in re.findall(r"`([\w.]+)`", row[3]):
             assert {*name.split(".")[-1:]} <= known, name
+
+
+def declared():
+    """Return keys and variables with their meanings and units, by their symbols as the glossary writes them."""
+    result = {}
+    letters = {"alpha": "α", "beta": "β", "nu": "ν", "rho": "ρ", "lambda": "λ"}
+    for _, field in all_tables(Scenario):
+        for table in tables(field.annotation).values():
+            for key, declared_key in keys(table).items():
+                quantity = declaration(declared_key)
+                if quantity is not None and quantity.symbol:
+                    symbol = letters.get(quantity.symbol, quantity.symbol)
+                    result.setdefault(symbol, set()).add((key, quantity.unit))
+    return result
+
+
+def test_symbols_of_one_letter_have_one_meaning_in_glossary_and_registry():
+    owners = {
+        "h": {"thickness"},
+        "n": {"front_exponent"},
+        "β": {"bond_share"},
+        "ρ": {"rebinding_ratio"},
+        "n_s": {"site_density"},
+    }
+    found = declared()
+    for symbol, owned in owners.items():
+        assert {key for key, _ in found[symbol]} == owned, symbol
+        (row,) = (row for row in rows() if symbol in re.split(", | = ", row[0]))
+        assert any(name in row[3] for name in owned), row
 
 
 def test_an_identifier_of_a_source_is_one_that_the_project_holds_or_a_preprint():

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from sim.ensemble.variables import READ
 from sim.parts.bonds.models import Model
 from sim.parts.contact.balance import Balance
 from sim.parts.exchange import Array, Bonding, ContactState, Motion
@@ -25,6 +26,7 @@ _NO_PHYSICS = (
     "ensemble",
     "incipient",
     "instrument",
+    "jump_in",
     "record",
     "seed",
     "zero",
@@ -59,6 +61,21 @@ def history_at_rest(scenario: Scenario, time: Array) -> Trajectory:
     touch = type(start)(*map(np.concatenate, zip(start, after, strict=True)))
     motion, bonding, energy, _ = _in_steady_sliding(scenario, time, 0.0 * time)
     return _trajectory(motion, bonding, energy, touch)
+
+
+def jump_into_contact(scenario: Scenario) -> tuple[float, float]:
+    """Return the displacement of the mount at which a free sphere at rest jumps into contact [m], and the load [N].
+
+    The load is that right after the jump, in equilibrium. In JKR's theory the sphere jumps as it touches, at zero. With
+    a range of adhesion it jumps at the distance w/σ0.
+    """
+    at_rest = np.zeros((1, 1))
+    *_, terms = _in_steady_sliding(scenario, at_rest, at_rest)
+    work = float(np.ravel(terms.bonded - terms.fluctuating)[0])
+    displacement = -scenario.contact.jump_in_distance(work)
+    there = changed(scenario, {f"contact.{scenario.contact.kind}": displacement})
+    load = READ["normal_load"](there, steady_course(there, at_rest, at_rest))
+    return displacement, float(np.ravel(load)[0])
 
 
 def _in_steady_sliding(

@@ -258,7 +258,9 @@ def _on_layer(start, work, tilt, mount, body):
         target = min(target, 2.0 * a)
         if not low < target < high:
             target = 0.5 * (low + high)
-        if abs(target - a) <= _CLOSE * a or high - low <= _ROUNDING * high:
+        # of an end that is not known yet the width is no bound
+        is_narrow = high < math.inf and high - low <= _ROUNDING * high
+        if abs(target - a) <= _CLOSE * a or is_narrow:
             return target, steepness
         a = target
     return math.nan, math.nan

@@ -205,7 +205,7 @@ def rounded(value: Any, unit: str) -> str:
 
 
 _GREEK = re.compile(
-    r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma|Delta)(?![A-Za-z])"
+    r"(?<![A-Za-z])(alpha|beta|rho|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma|Delta)(?![A-Za-z])"
 )
 
 

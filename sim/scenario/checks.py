@@ -15,6 +15,7 @@ from sim.parts.bonds.models import Cohort, Tracked
 from sim.parts.exchange import Array
 from sim.spectrum.families import Measured
 from sim.units.notation import engineering
+from sim.units.tables import Loop
 
 _STEPS_A_CYCLE = 2
 #: Times between which the slip of a run is looked at.
@@ -80,6 +81,10 @@ def _too_short(scene: Scene) -> Faults:
             ("contact", contact.kind, "cycles"),
             f"{fault}; make fewer cycles or shorter steps",
         )
+    elif isinstance(contact.course, Loop) and min(contact.course.ways) < clock.step:
+        fault = f"one way of the loop takes {min(contact.course.ways):.3g} s, less than a clock step"
+        cure = "lower its approach or retraction, or clock.step"
+        yield ("contact", contact.kind), f"{fault}; {cure}"
 
 
 def _unlike_contact(scene: Scene) -> Faults:

@@ -230,8 +230,9 @@ def _unknown(root: type, table: _Place, key: str) -> Fault:
         for above, field in all_tables(root)
         if any(key in keys(t) for t in _inner(field).values())
     ]
-    # zeros have the names of what they are zeros of
-    elsewhere = [above for above in elsewhere if above != ("zero",)] or elsewhere
+    # zeros and readings have the names of what they are zeros and readings of
+    readings = ("zero",), ("jump_in",)
+    elsewhere = [above for above in elsewhere if above not in readings] or elsewhere
     if len(elsewhere) == 1:
         return Fault(
             path,

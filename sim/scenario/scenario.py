@@ -44,7 +44,7 @@ from sim.step.prescribed import Prescribed
 from sim.step.stepper import Models, Scene, Stepper
 from sim.units import notebook
 from sim.units.errors import BadInput
-from sim.units.instrument import Instrument, Zero
+from sim.units.instrument import Instrument, JumpIn, Zero
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 
@@ -279,6 +279,7 @@ class Scenario:
     record: Record = Field(default_factory=Record)
     instrument: Instrument | None = None
     zero: Zero | None = None
+    jump_in: JumpIn | None = None
     temperature: Temperature | None = None
     incipient: Incipient | None = None
     accuracy: Accuracy | None = None

@@ -18,6 +18,7 @@ _SHARED = (
     "name",
     "ensemble",
     "instrument",
+    "jump_in",
     "record",
     "zero",
 )

@@ -258,7 +258,7 @@ class Tabulated(FromFile):
 
 
 STRESS = Quantity("Pa", "shear stress", "τ1")
-SPACING = Quantity("m", "distance between neighbouring points of the map", "h", above=0)
+SPACING = Quantity("m", "distance between neighbouring points of the map", "d", above=0)
 #: Most numbers of a map, and least along a side.
 _MOST, LEAST = 10**8, 8
 

@@ -73,7 +73,7 @@ _OTHER_UNIT = 100.0
 #: Residual beyond which the best curve does not reach a point.
 _FAR = 3.0
 #: Tables of keys that are not physical.
-_OTHER = ("clock", "record", "ensemble", "seed", "instrument")
+_OTHER = ("clock", "record", "ensemble", "seed", "instrument", "jump_in")
 #: Rises of chi^2 in the figure of a profile, over that at the ends of an interval.
 _SHOWN = 10.0
 #: Half width of an interval over the value, beyond which the data hardly fix a value.
@@ -486,6 +486,7 @@ def _remarks(result: Fit) -> Iterator[str]:
     yield from _deciding(result)
     yield from _heavy(problem, result.best)
     yield from _unreached(problem, result.best)
+    yield from _missed_jumps(problem, result.best)
     yield from _one_sided(problem, result.best)
     for number, name in enumerate(problem.names):
         here = problem.curve == number
@@ -519,7 +520,7 @@ def _loose(result: Fit) -> Iterator[str]:
 
 
 def _deciding(result: Fit) -> Iterator[str]:
-    """Yield the keys whose value with a zero held at its start lies outside the interval with the zero free."""
+    """Yield the physical keys whose value with a zero held at its start lies outside their interval."""
     for profile in result.profiles:
         k = [item.free.key for item in result.numbers].index(profile.key)
         zero = result.numbers[k].free
@@ -527,7 +528,8 @@ def _deciding(result: Fit) -> Iterator[str]:
         moved = []
         for item, value in zip(result.numbers, profile.numbers[held], strict=True):
             low, high = item.interval[:2]
-            if item.free.key != profile.key and not low <= value <= high:
+            is_zero = item.free.name.startswith("zero.")
+            if not is_zero and not low <= value <= high:
                 text = engineering(float(value), item.free.quantity.unit)
                 _, interval, unit = item.texts
                 words = f"{item.free.key} is {text}, not {interval} {unit}"
@@ -570,6 +572,15 @@ def _unreached(problem: Problem, best: Minimum) -> Iterator[str]:
             places = ", ".join(map(problem.place, rows[:_MOST_ROWS]))
             more = ", ..." * (rows.size > _MOST_ROWS)
             yield f"the best curve does not reach {rows.size} points, where its contact is {words}: {places}{more}"
+
+
+def _missed_jumps(problem: Problem, best: Minimum) -> Iterator[str]:
+    """Yield the readings at the jump into contact that the best curve misses by more than their errors."""
+    for row, off in zip(_jumps(problem, best), problem.off_jumps(best.x), strict=True):
+        if abs(off) > _FAR:
+            place, read, at = row["jump into contact"], row["reading"], row["fit"]
+            cause = "the sphere closes elsewhere than in the model, or the error is too small"
+            yield f"the jump into contact is missed by {abs(off):.2g} errors: {place} is {read}, not {at}; {cause}"
 
 
 def _one_sided(problem: Problem, best: Minimum) -> Iterator[str]:
@@ -877,6 +888,8 @@ def carried_out(
     shown: list[Printed] = [(_table(result), below)]
     if result.differences:
         shown.append((_differences(result), ""))
+    if result.problem.jumps:
+        shown.append((_jumps(result.problem, result.best), ""))
     shown += [(_profile(result, profile), "") for profile in result.profiles]
     if verdict is not None:
         doubt = "; but even the unchanged scenario misses the data, so perhaps none of these is true"
@@ -929,38 +942,57 @@ def _profile(fit: Fit, profile: ZeroProfile) -> list[dict[str, str]]:
     return rows
 
 
+def _jumps(problem: Problem, best: Minimum) -> list[dict[str, str]]:
+    """Return one row for each reading at a jump into contact, with that of the best curve."""
+    rows = []
+    for (k, jump), value in zip(
+        problem.jumps, problem.predicted_jumps(best.x).tolist(), strict=True
+    ):
+        unit = "m" if jump.name == "displacement" else "N"
+        factor, shown = scaled(jump.value, unit)
+        stem = f"{problem.tables[k].stem}, " * (len(problem.tables) > 1)
+        row = {"jump into contact": f"{stem}{jump.name}"}
+        row["reading"] = f"{concise(factor * jump.value, factor * jump.error)} {shown}"
+        row["fit"] = f"{factor * value:.6g} {shown}"
+        rows.append(row)
+    return rows
+
+
 def zero_figure(fit: Fit) -> Figure:
-    """Draw for each free zero the least chi^2 over it, with the rise of a 95 % interval, and the other values there."""
+    """Draw for each free zero the least chi^2 over it, with the rise of a 95 % interval, and the physical values there.
+
+    All zeros share the scales of the values, so that the steepness tells which of them decides.
+    """
+    keys = [item.free.key for item in fit.numbers]
+    physical = [k for k, key in enumerate(keys) if not key.startswith("zero.")]
+    least = fit.best.chi_square
+    rise = float(stats.chi2.ppf(LEVEL, 1))
     with mpl.rc_context(style.STYLE):
-        rows, columns = len(fit.numbers), len(fit.profiles)
-        size = 3.4 * columns, 1.5 * rows
-        picture = Figure(figsize=size, layout="constrained")
-        axes = picture.subplots(rows, columns, sharex="col", squeeze=False)
-        for column, profile in zip(axes.T, fit.profiles, strict=True):
-            keys = [item.free.key for item in fit.numbers]
+        rows, columns = 1 + len(physical), len(fit.profiles)
+        picture = Figure(figsize=(3.4 * columns, 1.5 * rows), layout="constrained")
+        shared: Any = {"sharex": "col", "sharey": "row", "squeeze": False}
+        axes = picture.subplots(rows, columns, **shared)
+        places = []
+        for profile, panel in zip(fit.profiles, axes[0], strict=True):
             own = fit.numbers[keys.index(profile.key)]
             x = Unit.of(profile.values, own.free.quantity.unit, False)
-            first, *others = column
-            first.plot(x.factor * profile.values, profile.chi_squares, ".-", color=BOTH)
-            rise = fit.best.chi_square + stats.chi2.ppf(LEVEL, 1)
-            first.axhline(rise, **style.GUIDE)
-            # far from the minimum chi^2 would hide what it does near it
-            first.set_ylim(
-                2.0 * fit.best.chi_square - rise,
-                fit.best.chi_square + _SHOWN * (rise - fit.best.chi_square),
-            )
-            first.set_ylabel("$\\chi^2$")
-            rest = [k for k, key in enumerate(keys) if key != profile.key]
-            for panel, k in zip(others, rest, strict=True):
-                quantity, values = fit.numbers[k].free.quantity, profile.numbers[:, k]
-                y = Unit.of(values, quantity.unit, False)
-                panel.plot(
-                    x.factor * profile.values, y.factor * values, ".-", color=BOTH
-                )
-                panel.set_ylabel(y.label(keys[k].split(".")[-1].replace("_", " ")))
-            for panel in column:
-                panel.axvline(x.factor * own.value, **style.GUIDE)
-            column[-1].set_xlabel(x.label(profile.key.replace("_", " ")))
+            places.append(x.factor * profile.values)
+            panel.plot(places[-1], profile.chi_squares, ".-", color=BOTH)
+            panel.axhline(least + rise, **style.GUIDE)
+            for below in axes[:, len(places) - 1]:
+                below.axvline(x.factor * own.value, **style.GUIDE)
+            axes[-1, len(places) - 1].set_xlabel(x.label(profile.key))
+        # far from the minimum chi^2 would hide what it does near it
+        axes[0, 0].set_ylim(least - rise, least + _SHOWN * rise)
+        axes[0, 0].set_ylabel("$\\chi^2$")
+        for k, panels in zip(physical, axes[1:], strict=True):
+            values = [profile.numbers[:, k] for profile in fit.profiles]
+            unit = fit.numbers[k].free.quantity.unit
+            y = Unit.of(np.concatenate(values), unit, False)
+            for panel, place, line in zip(panels, places, values, strict=True):
+                panel.plot(place, y.factor * line, ".-", color=BOTH)
+            name = keys[k].split(".")[-1].replace("_", " ")
+            panels[0].set_ylabel(y.label(name))
         return picture
 
 
@@ -1040,6 +1072,18 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
                 "numbers": dict(zip(fit.values, item.numbers.T.tolist(), strict=True)),
             }
             for item in fit.profiles
+        ]
+    if fit.problem.jumps:
+        readings = zip(
+            fit.problem.jumps, fit.problem.predicted_jumps(fit.best.x), strict=True
+        )
+        result["jumps_into_contact"] = [
+            {
+                "table": fit.problem.tables[k].stem,
+                **jump._asdict(),
+                "fit": float(value),
+            }
+            for (k, jump), value in readings
         ]
     if verdict is not None:
         judged = [item._asdict() for item in verdict.judged]

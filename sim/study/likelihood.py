@@ -24,7 +24,12 @@ from scipy import linalg, optimize, stats
 from scipy.stats import qmc
 
 from sim.ensemble.dataset import variable_name
-from sim.ensemble.steady import Values, history_at_rest, steady_course
+from sim.ensemble.steady import (
+    Values,
+    history_at_rest,
+    jump_into_contact,
+    steady_course,
+)
 from sim.ensemble.variables import READ, VARIABLES
 from sim.laws import theories
 from sim.laws.incipient import Incipient
@@ -36,7 +41,7 @@ from sim.scenario.schema import changed, quantities
 from sim.step.state import Trajectory
 from sim.study.noise import FEWEST, Noise, noise_of
 from sim.units.errors import BadInput
-from sim.units.instrument import Instrument, Zero
+from sim.units.instrument import Instrument, Reading, Zero
 from sim.units.quantity import Quantity
 from sim.units.tables import names_of, read_measured
 
@@ -79,7 +84,7 @@ class Measured(NamedTuple):
     ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement),
     ``"tangential_force"`` and those of other keys of the scenario. Rows have the same numbers in all columns. ``mount``
     is the key of the contact that holds the sphere. The first ``baseline`` rows were measured before the contact;
-    ``noise`` is that of curves there.
+    ``noise`` is that of curves there. ``jumps`` are the readings at the jump into contact.
     """
 
     path: Path
@@ -88,6 +93,7 @@ class Measured(NamedTuple):
     curves: tuple[Curve, ...]
     baseline: int = 0
     noise: Mapping[str, Noise] = MappingProxyType({})
+    jumps: tuple[Reading, ...] = ()
 
     @property
     def has_history(self) -> bool:
@@ -179,12 +185,21 @@ def read(
     for fault in faults_of(scenario, conditions, curves):
         raise BadInput([f"{path}: {fault}"])
     table = Measured(path, scenario.contact.kind, conditions, curves)
-    if scenario.instrument is None:
-        return table
     try:
-        return _stretch(table, scenario.instrument, place)
+        if scenario.jump_in is not None:
+            table = table._replace(jumps=scenario.jump_in.readings(*place))
+        if scenario.instrument is not None:
+            table = _stretch(table, scenario.instrument, place)
     except ValueError as fault:
         raise BadInput([f"{path}: {fault}"]) from None
+    if table.jumps and table.mount == "load":
+        reason = "a contact under a load closes at a load of 0, wherever the sphere is"
+        cure = "prescribe contact.displacement or contact.indentation"
+        raise BadInput([f"{path}: jump_in: {reason}; {cure}, or omit the table"])
+    if table.jumps and not table.has_history:
+        cure = "add the columns t and displacement or indentation, or omit the table"
+        raise BadInput([f"{path}: jump_in: needs the history of a loop; {cure}"])
+    return table
 
 
 def _stretch(
@@ -820,11 +835,40 @@ class Problem:
     def predicted(self, x: Array) -> Array:
         """All curves, with the shift and the common errors."""
         result = self.steady(x) + self.shift
-        for k, (name, size) in enumerate(self.common.items()):
-            result = np.where(
-                self.of(name), result * (1.0 + size * x[len(self.free) + k]), result
-            )
+        for name in self.common:
+            shared = self._shared(x, name)
+            result = np.where(self.of(name), result * shared, result)
         return result
+
+    def _shared(self, x: Array, name: str) -> float:
+        """Return the factor of a common error on all readings of a variable."""
+        errors = zip(self.common.items(), x[len(self.free) :], strict=False)
+        return math.prod(1.0 + size * e for (key, size), e in errors if key == name)
+
+    @property
+    def jumps(self) -> list[tuple[int, Reading]]:
+        """Return the table and the reading of each datum of a jump into contact."""
+        return [
+            (k, jump) for k, table in enumerate(self.tables) for jump in table.jumps
+        ]
+
+    def predicted_jumps(self, x: Array) -> Array:
+        """Return the readings at the jumps into contact, by the model, the zeros and the common errors.
+
+        The drift of a zero counts from the first row of the stretch, which the jump precedes.
+        """
+        result, all_groups = [], self.groups_at(x)
+        for k, jump in self.jumps:
+            first, kind = all_groups[k][0], self.tables[k].mount
+            scenario = changed(first.scenario, self.of_table(x, k))
+            zero = scenario.zero or Zero()
+            displacement, load = jump_into_contact(scenario)
+            if jump.name == "displacement":
+                result.append(displacement / first.scale + zero.at(kind, 0.0))
+            else:
+                load += zero.at(jump.name, 0.0)
+                result.append(load * self._shared(x, jump.name))
+        return np.array(result)
 
     def between(
         self, x: Array, table: int, name: str, along: tuple[str, NDArray[np.int64]]
@@ -876,23 +920,34 @@ class Problem:
         return f"{stem}{name}: row {row}"
 
     def residuals(self, x: Array) -> Array:
-        """Deviations over errors, and the common errors over their sizes."""
+        """Deviations over errors, those of the jumps into contact, and the common errors over their sizes."""
         off = (self.values - self.predicted(x)) / np.hypot(self.sigma, self.noise)
         off = np.nan_to_num(off, nan=_OPEN, posinf=_OPEN, neginf=-_OPEN)
         for rows, root in self.whitening:
             off[rows] = linalg.solve_triangular(root, off[rows], lower=True)
         drawn = [] if self.spring is None else [self.spring(x)]
-        return np.concatenate([off, x[len(self.free) :], drawn])
+        return np.concatenate([off, self.off_jumps(x), x[len(self.free) :], drawn])
+
+    def off_jumps(self, x: Array) -> Array:
+        """Return the deviations of the jumps into contact over their errors."""
+        read = np.array([(jump.value, jump.error) for _, jump in self.jumps])
+        values, errors = read.reshape(-1, 2).T
+        return np.asarray((values - self.predicted_jumps(x)) / errors)
+
+    @property
+    def data(self) -> int:
+        """Number of measured numbers, of the curves and of the jumps into contact."""
+        return len(self.values) + len(self.jumps)
 
     @property
     def freedom(self) -> int:
         """Degrees of freedom."""
-        return len(self.values) - len(self.free)
+        return self.data - len(self.free)
 
     def criterion(self, chi_square: float) -> float:
         """Akaike's criterion for few points, AICc."""
         count = len(self.free) + len({*self.curve[self.estimated].tolist()})
-        left = len(self.values) - count - 1
+        left = self.data - count - 1
         if left <= 0:
             return math.inf
         size = chi_square + 2.0 * float(np.sum(np.log(self.sigma[self.estimated])))
@@ -1039,7 +1094,7 @@ def with_errors(
         start, off = best.x, problem.values - problem.predicted(best.x)
         if not problem.estimated.any():
             break
-        sigma, share = problem.sigma.copy(), problem.freedom / len(problem.values)
+        sigma, share = problem.sigma.copy(), problem.freedom / problem.data
         for number in np.unique(problem.curve[problem.estimated]):
             here = problem.curve == number
             scatter = math.sqrt(float(np.sum(off[here] ** 2)) / (share * here.sum()))

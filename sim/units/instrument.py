@@ -296,3 +296,79 @@ class Zero:
         if key not in ("displacement", "indentation", "load"):
             return 0.0
         return getattr(self, key) + getattr(self, f"{key}_drift") * elapsed
+
+
+class Reading(NamedTuple):
+    """One reading of the instrument and its standard error [SI]; ``name`` is that of its variable."""
+
+    name: str
+    value: float
+    error: float
+
+
+@keyed(kw_only=True)
+class JumpIn:
+    """Readings of the instrument at the jump into contact, which a fit of loops compares with the jump of the model.
+
+    They are data beside the curves. A run does not read them. Each list has one value for all files of a fit, or one
+    for each file in turn.
+    """
+
+    displacement: Annotated[
+        tuple[
+            Annotated[float, Quantity("m", "reading of the displacement at the jump")],
+            ...,
+        ],
+        Field(
+            description="readings of the displacement or indentation at which the contact closes, one or one a file"
+        ),
+    ] = ()
+    displacement_error: (
+        Annotated[float, Quantity("m", "standard error of the displacement", above=0)]
+        | None
+    ) = None
+    load: Annotated[
+        tuple[
+            Annotated[float, Quantity("N", "reading of the load after the jump")], ...
+        ],
+        Field(
+            description="readings of the load right after the jump, one or one a file"
+        ),
+    ] = ()
+    load_error: (
+        Annotated[float, Quantity("N", "standard error of the load", above=0)] | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _with_errors(self) -> "JumpIn":
+        if not self.displacement and not self.load:
+            fault = "has no reading"
+            cure = (
+                'give displacement = ["2.5 um"] or load = ["-40 nN"], or omit the table'
+            )
+            raise PydanticCustomError("jump_in", f"{fault}; {cure}")
+        for name in ("displacement", "load"):
+            if bool(getattr(self, name)) != (
+                getattr(self, f"{name}_error") is not None
+            ):
+                fault = f"{name} and {name}_error belong together"
+                raise PydanticCustomError(
+                    "jump_in", f"{fault}; give both, or omit both"
+                )
+        return self
+
+    def readings(self, place: int, files: int) -> tuple[Reading, ...]:
+        """Return the readings of a file of a fit; ``ValueError`` if their number is not that of the files."""
+        result = []
+        for name, variable in (
+            ("displacement", "displacement"),
+            ("load", "normal_load"),
+        ):
+            values, error = getattr(self, name), getattr(self, f"{name}_error")
+            if len(values) not in (0, 1, files):
+                fault = f"jump_in.{name} has {len(values)} readings for {files} files"
+                raise ValueError(f"{fault}; give one, or one for each file")
+            if values:
+                value = values[place] if len(values) > 1 else values[0]
+                result.append(Reading(variable, value, error))
+        return tuple(result)

@@ -802,9 +802,52 @@ class Holds(Rows):
         return float(self._rows[0][-1])
 
 
+@keyed(kw_only=True)
+class Loop(Rows):
+    """To a value and back, each way at a speed of its own; after the way back the value stays.
+
+    >>> course = Loop(**{"from": -1e-6, "to": 1e-6, "approach": 2e-6, "retraction": 1e-6})
+    >>> course.at(np.array([0.0, 0.5, 1.0, 2.0, 9.0]), 9.0).tolist(), course.lasts
+    ([-1e-06, 0.0, 1e-06, 0.0, -1e-06], 3.0)
+    """
+
+    start: Annotated[float, Field(alias="from")]
+    stop: Annotated[float, Field(alias="to")]
+    approach: Annotated[float, Quantity("m/s", "speed of the way there", above=0)]
+    retraction: Annotated[float, Quantity("m/s", "speed of the way back", above=0)]
+    end: ClassVar[float] = math.inf  # type: ignore[misc]
+
+    @model_validator(mode="after")
+    def _has_a_way(self) -> "Loop":
+        if self.start == self.stop:
+            message = "a loop needs a way; give two different values"
+            raise PydanticCustomError("no_way", message)
+        return self
+
+    @property
+    def ways(self) -> tuple[float, float]:
+        """Times of the way there and of that back [s]."""
+        way = abs(self.stop - self.start)
+        return way / self.approach, way / self.retraction
+
+    @cached_property
+    def _rows(self) -> tuple[Array, Array]:  # type: ignore[override]
+        times = list(itertools.accumulate((0.0, *self.ways)))
+        return np.array(times), np.array([self.start, self.stop, self.start])
+
+    @property
+    def lasts(self) -> float:
+        """Time from the start to the end of the way back [s]."""
+        return float(self._rows[0][-1])
+
+
 def _kind(value: Any) -> str:
     if isinstance(value, Holds) or (isinstance(value, dict) and "holds" in value):
         return "[list of holds]"
+    if isinstance(value, Loop) or (
+        isinstance(value, dict) and {"approach", "retraction"} & value.keys()
+    ):
+        return "[loop]"
     if isinstance(value, Table) or (
         isinstance(value, dict) and ("file" in value or "time" in value)
     ):
@@ -812,10 +855,12 @@ def _kind(value: Any) -> str:
     return "[course]" if isinstance(value, dict | Course) else "[value]"
 
 
-def over_time(unit: Quantity, name: str, holds: type[Holds] | None = None) -> Any:
+def over_time(
+    unit: Quantity, name: str, holds: type[Holds] | None = None, loops: bool = False
+) -> Any:
     """Return the annotation of a prescribed quantity: a number, a course, or a table whose column has this name.
 
-    A speed may have ``holds``, too.
+    A speed may have ``holds``, too, and a place loops by the speed if ``loops`` is true.
     """
 
     @keyed(kw_only=True)
@@ -840,14 +885,31 @@ def over_time(unit: Quantity, name: str, holds: type[Holds] | None = None) -> An
             ),
         ] = ""
 
+    @keyed(kw_only=True)
+    class _Loop(Loop):
+        """To a value and back, each way at a speed of its own; after the way back the value stays."""
+
+        start: Annotated[float, unit, Field(alias="from")]
+        stop: Annotated[float, unit, Field(alias="to")]
+
     number, course = (
         Annotated[float, unit, Tag("[value]")],
         Annotated[_Course, Tag("[course]")],
     )
     kinds = number | course | Annotated[_Table, Tag("[table]")]
+    admitted = {"[value]", "[course]", "[table]"}
     if holds is not None:
         kinds |= Annotated[holds, Tag("[list of holds]")]  # type: ignore[valid-type]
-    return Annotated[kinds, Discriminator(_kind)]
+        admitted.add("[list of holds]")
+    if loops:
+        kinds |= Annotated[_Loop, Tag("[loop]")]
+        admitted.add("[loop]")
+
+    def kind(value: Any) -> str:
+        # keys of a kind that is not admitted are then none of a course
+        return _kind(value) if _kind(value) in admitted else "[course]"
+
+    return Annotated[kinds, Discriminator(kind)]
 
 
 #: A value prescribed over a run.

@@ -120,6 +120,24 @@ def test_the_radius_is_the_largest_stable_one_of_a_scan_of_all_radii():
     assert found > 250 and partly > 10
 
 
+@pytest.mark.parametrize("work", [0.0, 1e-3])
+@pytest.mark.parametrize("thickness", [10.0, 1.0, 0.2, 0.1])
+def test_the_radius_is_the_same_from_any_start_on_either_side(work, thickness):
+    # the width of a bracket without its upper end had been taken for narrow
+    body, depth = (1.0, 4.0, 1.0 / thickness), 0.3
+    mount = (0.0, depth, math.inf)
+
+    def missing(a):
+        x = a / thickness
+        e1, e2 = (layer.contact_function(float(k), x) for k in (layer.E_1, layer.E_2))
+        return depth * e1 - a**2 * e2 + math.sqrt(math.pi * a * work / 2.0)
+
+    exact = brentq(missing, 0.1, 3.0, xtol=1e-15, rtol=1e-14)
+    starts = exact * np.geomspace(0.1, 10.0, 21)
+    found = [equilibrium.largest_radius(a, work, 0.0, mount, body)[0] for a in starts]
+    assert_allclose(found, exact, rtol=1e-12, atol=0)
+
+
 def test_the_energy_of_a_contact_has_the_load_and_the_release_rate_as_its_slopes():
     solid, sphere_radius = Layer(1.3, 0.4), 7.0
     for radius in (1e-3, 0.1, 0.6, 4.0, 20.0):

@@ -1,7 +1,9 @@
 """Measured loops: zeros, drifts and correlated noise of an instrument, found from synthetic files of its form."""
 
+import functools
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +13,11 @@ from scipy import stats
 
 import sim
 from sim.cli import cli
-from sim.ensemble.steady import history_at_rest
+from sim.ensemble.steady import history_at_rest, jump_into_contact
 from sim.scenario.files import written as toml
 from sim.scenario.reader import load
 from sim.study import likelihood
-from sim.study.fit import fit, free_number
+from sim.study.fit import fit, free_number, zero_figure
 from sim.study.likelihood import minimum, problem_of
 from sim.study.noise import Noise, noise_of
 from sim.units.errors import BadInput
@@ -68,8 +70,9 @@ WHERE = {"zero.displacement": ZERO, "zero.load": ZERO_LOAD}
 ZEROS = ["zero.displacement=2.2 um:2.8 um", "zero.load=-20 nN:20 nN"]
 
 
-def loop(zero=ZERO, deepest=1e-6, noise=None, seed=0):
-    """Return times, readings of the displacement and the load of a loop with its zeros, drift and noise [SI]."""
+@functools.cache
+def loads_of(deepest):
+    """Return times, depths and loads of a loop without an instrument [SI]."""
     time = np.arange(0.0, LAST + 0.5)
     turn = 0.5 * (FIRST + LAST) - 20.0
     depth = deepest - 20e-9 * np.abs(time - turn)
@@ -84,8 +87,13 @@ def loop(zero=ZERO, deepest=1e-6, noise=None, seed=0):
     )
     load_of = np.zeros(len(time))
     load_of[rows] = sim.run(scene).normal_load.values
-    # a twin with noise has no drift, which is then one number less to find
-    load_of += ZERO_LOAD + (noise is None) * DRIFT * (time - FIRST)
+    return time, depth, load_of
+
+
+def loop(zero=ZERO, deepest=1e-6, noise=None, seed=0, drift=DRIFT):
+    """Return times, readings of the displacement and the load of a loop with its zeros, drift and noise [SI]."""
+    time, depth, load_of = loads_of(deepest)
+    load_of = load_of + ZERO_LOAD + drift * (time - FIRST)
     if noise is not None:
         load_of += noise.drawn(time, np.random.default_rng([77, seed]))
     return time, depth + zero, load_of
@@ -174,17 +182,13 @@ def test_loops_with_zeros_of_their_own_are_fitted_together_each_over_its_history
     assert np.all(np.abs(best.x - [*truth, *zeros.values()]) < 1e-2 * errors)
 
 
-def rise(problem, keys=()):
-    """Return by how much chi^2 is larger at the truth of some keys, by default all, than at its least."""
-    truth = {**TRUTH, **WHERE}
-    start = np.array([item.inner(truth[item.name]) for item in problem.free])
-    least = minimum(problem, start).chi_square
-    if not keys:
-        return np.sum(problem.residuals(start) ** 2) - least
+def least_sum(problem, keys=()):
+    """Return the least chi^2, with some keys held at the truth."""
+    truth = {**TRUTH, **WHERE, "zero.load_drift": DRIFT}
     free = [item for item in problem.free if item.name not in keys]
     place = np.array([item.inner(truth[item.name]) for item in free])
     held = replace(problem, free=free, fixed={key: truth[key] for key in keys})
-    return minimum(held, place).chi_square - least
+    return minimum(held, place).chi_square
 
 
 def test_the_truth_is_as_likely_as_it_should_be_with_the_noise_of_the_baseline_and_not_if_it_were_independent(
@@ -192,9 +196,11 @@ def test_the_truth_is_as_likely_as_it_should_be_with_the_noise_of_the_baseline_a
 ):
     rises, noise = np.zeros((_FEW, 2)), NOISE._replace(share=0.6, time=20.0)
     for seed in range(_FEW):
-        path = written(tmp_path / "loop.txt", *loop(noise=noise, seed=seed))
-        problem = posed(path, [*TRUTH, *ZEROS])
-        rises[seed] = rise(problem), rise(replace(problem, whitening=()))
+        drawn = loop(noise=noise, seed=seed, drift=0.0)
+        problem = posed(written(tmp_path / "loop.txt", *drawn), [*TRUTH, *ZEROS])
+        every = [*TRUTH, *WHERE]
+        for k, each in enumerate((problem, replace(problem, whitening=()))):
+            rises[seed, k] = least_sum(each, every) - least_sum(each)
     law = stats.chi2(_FEW * (len(TRUTH) + len(ZEROS)))
     sums = rises.sum(axis=0)
     assert law.ppf(1e-4) < sums[0] < law.ppf(1.0 - 1e-4), sums
@@ -202,17 +208,20 @@ def test_the_truth_is_as_likely_as_it_should_be_with_the_noise_of_the_baseline_a
 
 
 @pytest.mark.verify
-def test_intervals_of_200_loops_with_hidden_zeros_and_correlated_noise_hold_the_truth_in_88_to_99_of_100(
-    tmp_path,
+@pytest.mark.parametrize(
+    "keys", [[*TRUTH][:2], [*TRUTH][2:], [*WHERE, "zero.load_drift"]], ids=" ".join
+)
+def test_intervals_of_200_loops_with_hidden_zeros_drift_and_correlated_noise_hold_the_truth_in_88_to_99_of_100(
+    tmp_path, keys
 ):
-    keys = [*TRUTH, *WHERE]
     inside = np.zeros(len(keys))
+    # an interval of the profile likelihood holds a value whose rise is below this
+    bound = stats.chi2.ppf(likelihood.LEVEL, 1)
     for seed in range(_MANY):
         path = written(tmp_path / "loop.txt", *loop(noise=NOISE, seed=1000 + seed))
-        problem = posed(path, [*TRUTH, *ZEROS])
-        # an interval of the profile likelihood holds a value whose rise is below this
-        bound = stats.chi2.ppf(likelihood.LEVEL, 1)
-        inside += [rise(problem, [key]) < bound for key in keys]
+        problem = posed(path, [*TRUTH, *ZEROS, "zero.load_drift=-1 nN/s:1 nN/s"])
+        least = least_sum(problem)
+        inside += [least_sum(problem, [key]) - least < bound for key in keys]
     assert np.all((inside >= 0.88 * _MANY) & (inside <= 0.995 * _MANY)), inside
 
 
@@ -330,3 +339,183 @@ def test_rows_are_thinned_but_the_turn_of_the_mount_stays(tmp_path):
     assert rows["t"][[0, -1]].tolist() == [FIRST, LAST]
     steps = np.diff(rows["t"])
     assert steps.max() == 7.0 and np.sum(steps < 7.0) <= 3
+
+
+@pytest.mark.parametrize("kind", ["displacement", "indentation"])
+def test_a_sphere_jumps_in_where_it_touches_in_jkr_theory_and_at_the_reach_of_a_range_of_adhesion(
+    kind,
+):
+    work, radius, modulus, stress = 35e-3, 7.5e-6, 0.8e6 / 0.75, 2e5
+    held = {kind: 0.0} | ({"stiffness": STIFFNESS} if kind == "displacement" else {})
+    rest = {k: v for k, v in SCENE.items() if k not in ("instrument", "zero")}
+    at = {"solid.youngs_modulus": 0.8e6, "adhesion.work": work}
+    scene = load(rest | {"contact": {"model": "equilibrium"} | held}).with_values(at)
+    displacement, load_after = jump_into_contact(scene)
+    assert displacement == 0.0
+    # at grips a = (2 pi w R^2/E*)^(1/3), where P = -2 E* a^3/(3R)
+    a = (2.0 * np.pi * work * radius**2 / modulus) ** (1.0 / 3.0)
+    if kind == "indentation":
+        assert_allclose(load_after, -2.0 * modulus * a**3 / (3.0 * radius), rtol=1e-12)
+    else:
+        # a spring of 3 N/m is softer than the contact, so that the sphere sinks in
+        (run,) = np.ravel(sim.run(scene).normal_load.values[..., :1])
+        assert_allclose(load_after, run, rtol=1e-12)
+        assert -2.0 * modulus * a**3 / (3.0 * radius) < load_after < 0.0
+    ranged = {"model": "cohesive", "cohesive_stress": stress} | held
+    scene = load(rest | {"contact": ranged}).with_values(at)
+    displacement, load_after = jump_into_contact(scene)
+    assert_allclose(displacement, -work / stress, rtol=1e-14)
+    # just inside the reach the contact has jumped already
+    inside = {f"contact.{kind}": displacement * (1.0 - 1e-9)}
+    (run,) = np.ravel(sim.run(scene.with_values(inside)).normal_load.values[..., :1])
+    assert_allclose(load_after, run, rtol=1e-7)
+    assert load_after < 0.0
+
+
+def test_a_jump_into_contact_adds_the_inverse_of_its_variance_to_that_of_the_zero(
+    tmp_path,
+):
+    path, error = written(tmp_path / "loop.txt", *loop(noise=NOISE, drift=0.0)), 2e-9
+    reading = {"displacement": [ZERO], "displacement_error": error}
+    scene = load(SCENE | {"jump_in": reading}).with_values({**TRUTH, **WHERE})
+    table = likelihood.read(path, scene)
+    free = [free_number(scene, key) for key in [*TRUTH, *ZEROS]]
+    problems = [
+        problem_of(scene, [each], free, {})
+        for each in (table._replace(jumps=()), table)
+    ]
+    without, beside = problems
+    assert beside.freedom == without.freedom + 1
+    truth = np.array(
+        [item.inner({**TRUTH, **WHERE}[item.name]) for item in beside.free]
+    )
+    # the truth has no deviation at the jump
+    assert_allclose(beside.off_jumps(truth), 0.0, atol=1e-9)
+    before, after = (likelihood.covariance_at(each, truth) for each in problems)
+    # the reading depends on the zero alone: a step of Kalman's filter
+    column = before[:, 4]
+    expected = before - np.outer(column, column) / (error**2 + column[4])
+    scale = np.sqrt(np.diag(expected))
+    assert_allclose(
+        after / scale / scale[:, None], expected / scale / scale[:, None], atol=1e-6
+    )
+    spans = []
+    for each in problems:
+        best = minimum(each, truth)
+        low, high, *_ = likelihood.interval(each, best, 4)
+        assert low < ZERO < high
+        spans.append(high - low)
+    assert spans[1] < 0.9 * spans[0], spans
+
+
+def test_a_range_of_adhesion_moves_the_reading_of_the_jump_and_a_common_error_its_load():
+    ranged = {
+        "model": "cohesive",
+        "cohesive_stress": 2e5,
+        "stiffness": STIFFNESS,
+        "displacement": "0 um",
+    }
+    table = {"displacement": ["2.3 um"], "displacement_error": "5 nm"}
+    table |= {"load": ["-40 nN"], "load_error": "5 nN"}
+    rest = {k: v for k, v in SCENE.items() if k != "instrument"}
+    scene = load(rest | {"contact": ranged, "jump_in": table})
+    time = np.array([0.0, 1.0, 2.0])
+    points = likelihood.Measured(
+        path=Path("loop.csv"),
+        mount="displacement",
+        conditions={"t": time, "mount": np.array([2.4e-6, 2.5e-6, 2.4e-6])},
+        curves=(likelihood.Curve("normal_load", time, 1.0 + time),),
+        jumps=scene.jump_in.readings(0, 1),
+    )
+    free = [free_number(scene, "zero.displacement=2 um:3 um")]
+    problem = problem_of(scene, [points], free, {"normal_load": 0.1})
+    x = np.array([2.4e-6, 0.5])
+    _, load_after = jump_into_contact(scene)
+    expected = [2.4e-6 - 35e-3 / 2e5, 1.05 * load_after]
+    assert_allclose(problem.predicted_jumps(x), expected, rtol=1e-12)
+    off = [(2.3e-6 - expected[0]) / 5e-9, (-40e-9 - expected[1]) / 5e-9]
+    assert_allclose(problem.residuals(x)[3:5], off, rtol=1e-9)
+
+
+def test_the_command_reports_the_jump_into_contact_and_one_that_the_model_misses(
+    tmp_path,
+):
+    path = written(tmp_path / "loop.txt", *loop(noise=NOISE, drift=0.0))
+    held = {"displacement": "2.5 um", "load": "-1.5 nN", "load_drift": "0 nN/s"}
+    for reading, missed in ((2.5e-6, False), (2.3e-6, True)):
+        table = {"displacement": [reading], "displacement_error": "5 nm"}
+        scene = tmp_path / "loop.toml"
+        text = toml(SCENE | {"zero": held, "jump_in": table})
+        scene.write_text(text, encoding="utf-8")
+        command = ["fit", str(scene), str(path), "--free", "solid.youngs_modulus"]
+        command += ["-o", str(tmp_path / "out"), "--set", "instrument.every=16"]
+        result = CliRunner().invoke(cli, [*command, "--force"])
+        assert result.exit_code == 0, result.output
+        found = json.loads((tmp_path / "out_fit.json").read_text(encoding="utf-8"))
+        (jump,) = found["jumps_into_contact"]
+        assert_allclose([jump["value"], jump["fit"]], [reading, 2.5e-6], rtol=1e-12)
+        assert "reading" in result.output
+        words = "the jump into contact is missed by 40 errors"
+        assert any(words in text for text in found["remarks"]) == missed
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({}, "has no reading"),
+        ({"displacement": ["2.5 um"]}, "displacement_error belong together"),
+        ({"load_error": "2 nN", "displacement": ["2 um"]}, "belong together"),
+    ],
+)
+def test_a_jump_without_a_reading_or_its_error_is_refused(table, words):
+    with pytest.raises(BadInput) as refusal:
+        load(SCENE | {"jump_in": table})
+    assert "jump_in" in refusal.value.problems[0]
+    assert words in refusal.value.problems[0]
+
+
+def test_a_jump_is_refused_under_a_load_and_without_a_history_and_for_other_files(
+    tmp_path,
+):
+    table = {"displacement": ["2.5 um", "2.4 um"], "displacement_error": "5 nm"}
+    scene = load(SCENE | {"jump_in": table})
+    path = written(tmp_path / "loop.txt", *loop())
+    for place, faulty in (((0, 1), True), ((1, 2), False), ((0, 3), True)):
+        if faulty:
+            with pytest.raises(BadInput, match=f"2 readings for {place[1]} files"):
+                likelihood.read(path, scene, place=place)
+        else:
+            (jump,) = likelihood.read(path, scene, place=place).jumps
+            assert jump.value == 2.4e-6
+    rest = {k: v for k, v in SCENE.items() if k != "instrument"}
+    rest["jump_in"] = {**table, "displacement": ["2.5 um"]}
+    held = {"model": "equilibrium", "load": "0 N"}
+    plain = tmp_path / "plain.csv"
+    plain.write_text(
+        "t [s], normal_load [nN], contact_radius [um]\n0, 1, 1\n1, 2, 2\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(BadInput, match="jump_in: a contact under a load closes at"):
+        likelihood.read(plain, load(rest | {"contact": held}))
+    plain.write_text("t [s], normal_load [nN]\n0, 1\n1, 2\n", encoding="utf-8")
+    with pytest.raises(BadInput, match="jump_in: needs the history of a loop"):
+        likelihood.read(plain, load(rest))
+
+
+@pytest.mark.verify
+def test_the_made_up_loop_gives_the_numbers_with_which_it_was_made_and_draws_its_profiles():
+    path = Path(__file__).parents[2] / "scenarios" / "measured_loop.toml"
+    free = [*TRUTH, *ZEROS, "zero.load_drift=-1 nN/s:1 nN/s"]
+    result = fit(load(path), [path.with_suffix(".txt")], free)
+    for key, truth in (TRUTH | WHERE | {"zero.load_drift": 20e-12}).items():
+        low, high = result.intervals[key]
+        assert low < truth < high, key
+    axes = np.reshape(zero_figure(result).axes, (1 + len(TRUTH), 3))
+    for column, profile in zip(axes.T, result.profiles, strict=True):
+        # the rows below that of chi^2 are those of the physical keys
+        for k, panel in enumerate(column[1:]):
+            drawn = panel.get_lines()[1].get_ydata()
+            ratio = drawn / profile.numbers[:, k]
+            assert_allclose(ratio, ratio[0], rtol=1e-12)
+    spans = np.ptp([profile.numbers[:, 0] for profile in result.profiles], axis=1)
+    assert spans[0] > 10.0 * spans[1:].max()  # the zero of the displacement decides

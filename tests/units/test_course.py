@@ -24,6 +24,10 @@ COURSES = {
         {"from": 2.0, "to": 0.1, "scale": "log", "cycles": 2},
         [0.3, 0.6, 0.9],
     ),
+    "loop": (
+        {"from": -1.0, "to": 2.0, "approach": 6.0, "retraction": 7.5},
+        [0.5, 0.9],
+    ),
     "table": (
         {"time": [-1.0, 0.0, 0.5, 0.5, 0.8], "value": [9.0, 1.0, 2.0, -0.5, 1.5]},
         [0.5, 0.8],
@@ -35,9 +39,9 @@ TURNS = sorted({turn for _, turns in COURSES.values() for turn in turns})
 @functools.cache  # which an integrand evaluates thousands of times
 def course(name):
     return prescribed(
-        TypeAdapter(over_time(Quantity("N", "load", "P"), "load")).validate_python(
-            COURSES[name][0]
-        )
+        TypeAdapter(
+            over_time(Quantity("m", "place", "z"), "place", loops=True)
+        ).validate_python(COURSES[name][0])
     )
 
 
@@ -59,7 +63,16 @@ def test_pieces_hold_the_integral_and_the_path_of_the_value(name):
         # the zeros of the linear courses, besides their turns, are kinks of the magnitude
         kinks = [
             t
-            for t in (*TURNS, 0.2, 0.4, 0.5 + 0.3 * 0.25, 0.8, 1.0)
+            for t in (
+                *TURNS,
+                1 / 6,
+                0.2,
+                0.4,
+                0.5 + 0.3 * 0.25,
+                0.5 + 2 / 7.5,
+                0.8,
+                1.0,
+            )
             if start < t < stop
         ]
         exact = [

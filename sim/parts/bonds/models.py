@@ -143,7 +143,7 @@ CriticalSpeed = Annotated[
     float, Quantity("m/s", "critical speed of the bonds", "V_c", above=0)
 ]
 RebindingRate = Annotated[
-    float, Quantity("1/s", "rate at which a free site binds", "h", above=0)
+    float, Quantity("1/s", "rate at which a free site binds", "k_r", above=0)
 ]
 Start = Annotated[
     Literal["steady", "bonded", "empty"],
@@ -447,11 +447,12 @@ Rebinding = Annotated[
     ),
 ]
 Density = Annotated[
-    float, Quantity("1/m^2", "bond sites per area", "n", above=0, typical="1e17 1/m^2")
+    float,
+    Quantity("1/m^2", "bond sites per area", "n_s", above=0, typical="1e17 1/m^2"),
 ]
 Ratio = Annotated[
     float,
-    Quantity("1", "rebinding_rate over zero_force_rate", "beta", above=0, typical="10"),
+    Quantity("1", "rebinding_rate over zero_force_rate", "rho", above=0, typical="10"),
 ]
 _BY_SPEED = ("rupture.critical_speed", "rupture.stress", "rebinding_ratio")
 _T = TypeVar("_T", bound="_Stretched | Auto")

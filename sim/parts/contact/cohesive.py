@@ -232,6 +232,8 @@ class Cohesive(Equilibrium):
             remarks.append(
                 "the sphere begins within reach of the attraction, but does not touch"
             )
+        if self.load is None:
+            remarks += self._cut_short(setting)
         return remarks
 
     def pull_off_load(self, work: float, bodies: Bodies) -> float:

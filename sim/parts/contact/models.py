@@ -34,7 +34,7 @@ from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting
 from sim.solid import ElasticSolid, HalfSpace, Layer, UnderCircle
 from sim.spectrum.radial import PLANE
 from sim.units.quantity import Quantity, keyed
-from sim.units.tables import Prescribed, over_time, prescribed
+from sim.units.tables import Loop, Prescribed, over_time, prescribed
 
 
 @keyed()
@@ -265,10 +265,10 @@ _HALVINGS = 48
 
 _Load = over_time(Quantity("N", "normal load, compression positive", "P"), "load")
 _Indentation = over_time(
-    Quantity("m", "indentation of the sphere", "delta"), "indentation"
+    Quantity("m", "indentation of the sphere", "delta"), "indentation", loops=True
 )
 _Displacement = over_time(
-    Quantity("m", "displacement of the mount", "Delta"), "displacement"
+    Quantity("m", "displacement of the mount", "Delta"), "displacement", loops=True
 )
 _Healing = Annotated[
     float,
@@ -356,12 +356,23 @@ class _Controlled:
         return {}
 
     def remarks(self, setting: Setting) -> list[str]:
+        remarks = self._cut_short(setting)
         if not math.isnan(setting.rest_radius):
-            return []
+            return remarks
         never = "is open for the whole run: raise contact.{} to zero, where the sphere touches"
         jumps = "begins open and jumps in where contact.{} first reaches zero"
         course = jumps if max(self.course.extremes) >= 0.0 else never
-        return [f"the contact {course.format(self.kind)}"]
+        return [f"the contact {course.format(self.kind)}", *remarks]
+
+    def _cut_short(self, setting: Setting) -> list[str]:
+        """Return a remark if the run ends before the way back of a loop."""
+        course = self.course
+        if not isinstance(course, Loop):
+            return []
+        if setting.times.duration >= course.lasts * (1.0 - 1e-9):
+            return []
+        cure = f"set clock.duration to {course.lasts:.6g} s or more"
+        return [f"the run ends before the loop of contact.{self.kind} does: {cure}"]
 
     @cached_property
     def kind(self) -> str:

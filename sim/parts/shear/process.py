@@ -316,7 +316,7 @@ class Wave:
     waves: Annotated[
         float,
         Quantity(
-            "1", "number of wavelengths after which a mode is renewed", "n", above=0
+            "1", "number of wavelengths after which a mode is renewed", "n_w", above=0
         ),
     ]
     model: Literal["wave"] = "wave"

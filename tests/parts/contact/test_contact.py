@@ -24,6 +24,7 @@ from helpers.scenes import (
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
 
+import sim
 from sim.laws import jkr
 from sim.parts.contact import Equilibrium, RateDependent, front
 from sim.parts.contact.balance import elastic_energy
@@ -37,6 +38,7 @@ from sim.spectrum.families import (
     VonKarman,
 )
 from sim.spectrum.radial import Margin, disc_energy, marginal_energy
+from sim.units.errors import BadInput
 
 WORK = 1.0 / math.pi
 
@@ -588,3 +590,73 @@ def test_a_contact_remarks_on_a_start_out_of_touch():
         remarks = scenario.contact.remarks(scenario.setting)
         assert len(remarks) == bool(word)
         assert all(word in remark for remark in remarks)
+
+
+def test_a_loop_by_its_speeds_is_the_table_of_its_times_bit_for_bit():
+    by_speed = {"from": -4.5, "to": 1.1, "approach": 3.7, "retraction": 0.9}
+    way = abs(by_speed["to"] - by_speed["from"])
+    there, back = way / by_speed["approach"], way / by_speed["retraction"]
+    table = {"time": [0.0, there, there + back], "value": [-4.5, 1.1, -4.5]}
+    table = {name: [*column, column[-1]] for name, column in table.items()}
+    table["time"][-1] = 8.0
+    edge = {"front_speed": 1.0, "heal_speed": 10.0}
+    for held in ({}, {"stiffness": 2.0}):
+        kind = "displacement" if held else "indentation"
+        for model, own in ((Equilibrium, {}), (RateDependent, edge)):
+            first, second = (
+                course(
+                    maugis(model(**{kind: each}, **held, **own), 400, 8.0),
+                    *("contact_radius", "normal_load", "displacement"),
+                )
+                for each in (by_speed, table)
+            )
+            for ours, theirs in zip(first, second, strict=True):
+                assert_array_equal(ours, theirs)
+            assert first[0][0] == first[0][-1] == 0.0 and first[0].max() > 1.0
+
+
+def test_pull_off_grows_with_the_speed_of_retraction_as_the_law_of_the_edge_says():
+    # an edge that heals at once presses to equilibrium, from where the numbers of ``test_front`` begin; there the
+    # lowest loads are those of LSODA at 1e-11, with work (v/v0)^0.6 and v0 = 1 on a hard machine
+    rest = jkr.indentation_at_radius(6.0 ** (1.0 / 3.0), WORK, 1.0, 0.75)
+    loop = {"from": rest - 3.9, "to": rest, "approach": 100.0, "retraction": 0.1}
+    edge = {"front_speed": 1.0, "front_exponent": 0.6, "heal_speed": 1e12}
+    speeds = {0.1: -1.775354520, 1.0: None, 10.0: -4.560522114}
+    scene = maugis(RateDependent(indentation=loop, **edge), 40_000, 40.0)
+    key = "contact.indentation.retraction"
+    dataset = sim.run(scene.with_values({"sweep": {key: [*speeds]}}))
+    lowest = []
+    for speed, known in speeds.items():
+        row = dataset.sel(contact_indentation_retraction=speed)
+        load = np.ravel(row.normal_load)
+        low = int(np.nanargmin(load))
+        lowest.append(load[low])
+        # the lowest of samples is at most 1/8 of their second difference above the least value
+        bend = np.diff(load[low - 1 : low + 2], 2)[0] / 8.0
+        if known is not None:
+            assert known - 1e-5 < load[low] < known + bend + 1e-5
+    assert np.all(np.diff(lowest) < 0.0)
+
+
+def test_a_loop_that_the_run_or_its_steps_cut_short_is_named_and_a_faulty_one_refused():
+    loop = {"from": -1.0, "to": 1.0, "approach": 4.0, "retraction": 1.0}
+    for duration, is_short in ((2.5, False), (2.4, True)):
+        scene = maugis(Equilibrium(indentation=loop), 100, duration)
+        words = "the run ends before the loop of contact.indentation does"
+        assert (words in sim.check(scene)) == is_short
+        assert not is_short or "clock.duration to 2.5 s" in sim.check(scene)
+    with pytest.raises(BadInput, match=r"takes 0\.5 s, less than a clock step"):
+        maugis(Equilibrium(indentation=loop), 2, 2.0).with_values({})
+    for fault, words in (
+        ({"to": -1.0}, "needs a way"),
+        ({"approach": 0.0}, "approach"),
+        ({"retraction": "1 s"}, "retraction"),
+    ):
+        held = {"model": "equilibrium", "indentation": loop | fault}
+        with pytest.raises(BadInput, match=words):
+            maugis(Equilibrium(indentation=1.0)).with_values({"contact": held})
+    # a load has neither loops nor holds
+    for other, words in ((loop, "approach"), ({"holds": [1.0]}, "holds")):
+        held = {"model": "equilibrium", "load": other}
+        with pytest.raises(BadInput, match=f"{words}: is not a key"):
+            maugis(Equilibrium(indentation=1.0)).with_values({"contact": held})
