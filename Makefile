@@ -12,7 +12,7 @@ EXTRAS_OF = $(if $(filter run,$*),,[$(subst -,$(comma),$*)])
 # Commands and tests start many processes, which would compile each source anew without its bytecode.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test verify windows bench gallery docs lint lines clean
+.PHONY: run test verify page windows bench gallery docs lint lines clean
 
 run: $(ANY)
 	$(BIN)/sim run scenarios/pdms_lens.toml --force
@@ -32,8 +32,16 @@ parts = tests/parts
 folders = $(filter-out tests/helpers tests/windows tests/__pycache__, $(patsubst %/,%,$(wildcard tests/*/)))
 runs = $(filter-out $(laws) $(parts), $(folders)) $(wildcard tests/test_*.py)
 
-verify:
+verify: page
 	$(MAKE) EXTRAS=test,lint,verify $(GROUP:%=.verify-%)
+
+# `make page` tests the JavaScript of `sim explore`, and checks its types and its format. It needs Node.js 20 or later.
+page:
+	@if ! command -v node >/dev/null 2>&1; then \
+	  echo "make: Node.js is missing: the JavaScript of the page is not checked; install Node.js 20 or later"; \
+	else \
+	  { test -d node_modules || npm install --silent --no-audit --no-fund --no-package-lock; } && npm test --silent; \
+	fi
 
 .PHONY: .verify-laws .verify-parts .verify-runs .verify-lowest
 .verify-laws .verify-parts .verify-runs: .verify-%: $(STAMP)
@@ -122,4 +130,4 @@ $(VENV)/.installed-%: pyproject.toml constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(LOWEST) $(WINDOWS) docs/_build docs/_api build dist *.egg-info .mypy_cache .ruff_cache
+	rm -rf node_modules $(VENV) $(LOWEST) $(WINDOWS) docs/_build docs/_api build dist *.egg-info .mypy_cache .ruff_cache

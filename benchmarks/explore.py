@@ -35,20 +35,19 @@ WATCH = """(() => {
     });
     const begin = (event) => Object.assign(timing, { last: event.timeStamp, painted: null });
     document.addEventListener("input", begin, true);
-    const watch = setInterval(() => {
+    const drawn = () => {
         const plot = document.getElementById("plot");
-        if (!plot || !plot.on) return;
-        clearInterval(watch);
-        painted((now) => { timing.first = performance.timeOrigin + now; });
-        plot.on("plotly_afterplot", () => {
-            timing.redraws += 1;
-            const input = timing.last;
-            const same = Object.keys(state.values).every((key) => shown.values[key][0] === state.values[key]);
-            if (input !== null && same) painted((now) => {
-                if (timing.last === input && timing.painted === null) timing.painted = now - input;
-            });
+        if (timing.first === null) painted((now) => { timing.first = performance.timeOrigin + now; });
+        timing.redraws += 1;
+        const input = timing.last;
+        if (input !== null && plot.dataset.of === JSON.stringify(explored.values)) painted((now) => {
+            if (timing.last === input && timing.painted === null) timing.painted = now - input;
         });
-    }, 1);
+    };
+    document.addEventListener("DOMContentLoaded", () => {
+        const watch = (changes) => changes.some(({ addedNodes }) => addedNodes.length) && drawn();
+        new MutationObserver(watch).observe(document.getElementById("plot"), { childList: true });
+    });
 })()"""
 
 #: Moves a slider to places at 60 Hz, and returns the time that it took [ms]; a move that is late is made at once.
@@ -95,7 +94,7 @@ def main() -> None:
             page = browser.new_page(viewport={"width": 1200, "height": 900})
             painted(page, address, 0.0)
             page.wait_for_timeout(3000)
-            print(f"{page.locator('#sliders input[type=range]').count()} sliders")
+            print(f"{page.locator('#groups input[type=range]').count()} sliders")
             row("key press", presses(page))
             row("last move of a drag", [dragged(page) for _ in range(3)])
             page.locator("#members").fill("100000")
@@ -210,7 +209,7 @@ def latency(page: Page) -> float:
 
 def presses(page: Page) -> list[float]:
     """Press a key on the sliders in turn; return the latencies [ms]."""
-    sliders = page.locator("#sliders input[type=range]")
+    sliders = page.locator("#groups input[type=range]")
     result = []
     for number in range(PRESSES):
         slider = sliders.nth(number % sliders.count())
@@ -232,7 +231,7 @@ def dragged(page: Page) -> float:
     The page itself makes the events, because a driver waits for the page after each move and so keeps no pace.
     """
     places = (150.0 + 90.0 * np.sin(np.linspace(0.0, 6.0, MOVES))).round().tolist()
-    slider = page.locator("#sliders input[type=range]").first
+    slider = page.locator("#groups input[type=range]").first
     page.evaluate("timing.redraws = 0")
     seconds = slider.evaluate(MOVE, places) / 1e3
     result = latency(page)

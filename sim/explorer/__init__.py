@@ -6,7 +6,7 @@ from sim.units.errors import BadInput
 
 if missing := [
     name
-    for name in ("starlette", "uvicorn", "plotly", "tomlkit")
+    for name in ("starlette", "uvicorn", "tomlkit", "lmfit")
     if find_spec(name) is None
 ]:
     raise BadInput(

@@ -63,16 +63,15 @@ def compared(scenario: Scenario, table: Measured) -> dict[str, Any]:
     points = {}
     for number, curve in enumerate(table.curves):
         here = problem.curve == number
-        values, errors = (
-            curve.values,
-            np.where(problem.estimated, np.nan, problem.sigma)[here],
-        )
-        about = {"speed": listed(speeds), "residuals": listed(off[here])}
-        points[curve.name] = about | {
-            "values": listed(values),
-            "errors": listed(errors),
-        }
-        if curve.name == "contact_area":
+        values = curve.values
+        errors = np.where(problem.estimated, np.nan, problem.sigma)[here]
+        about = {"x": listed(speeds), "residuals": listed(off[here])}
+        name = curve.name
+        if name == "contact_radius":  # drawn as its area
+            name, errors = "contact_area", 2.0 * np.pi * np.abs(values) * errors
+            values = np.pi * values**2
+        points[name] = about | {"values": listed(values), "errors": listed(errors)}
+        if name == "contact_area":
             points["area_ratio"] = about | {
                 "values": listed(values / full),
                 "errors": listed(errors / full),
@@ -83,4 +82,5 @@ def compared(scenario: Scenario, table: Measured) -> dict[str, Any]:
         "chi_square": chi_square,
         "count": count,
         "name": table.path.name,
+        "remark": table.remark,
     }

@@ -17,9 +17,10 @@ _PROFILE, _MAP, _WIDE = 161, 64, 4.0
 def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
     """Return what is drawn of the contact in steady sliding at a speed [m/s].
 
-    ``radius`` and ``jkr_radius`` are in m, 0 if the contact is open. ``x``, ``sphere`` and ``surface`` are profiles
-    [m], positive upwards from the undeformed half-space. ``stress`` is a map of one realisation of the shear stress
-    [Pa], its mean included, of the side ``side`` [m]; None if the stress is the same everywhere.
+    ``radius`` and ``jkr_radius`` are in m, 0 if the contact is open; ``fluctuation_energy`` is in J/m². ``x``,
+    ``sphere`` and ``surface`` are profiles [m], positive upwards from the undeformed half-space. ``stress`` is a map of
+    one realisation of the shear stress [Pa], its mean included, of the side ``side`` [m]; None if the stress is the
+    same everywhere.
     """
     at_speed = {
         name: float(values[0])
@@ -32,6 +33,7 @@ def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
         "speed": speed,
         "radius": radius,
         "jkr_radius": full if math.isfinite(full) else None,
+        "fluctuation_energy": at_speed["fluctuation_energy"],
     }
     if not wide > 0.0:
         return result

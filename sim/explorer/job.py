@@ -16,11 +16,12 @@ from sim.ensemble.execute import end_with
 from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
 from sim.explorer.drawing import listed
+from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
 from sim.units.terminal import duration
 
-#: Most points of a trace or a band that are drawn.
+#: Most points of a band that are drawn, and intervals of a trace of which least and largest values are.
 _DRAWN = 1000
 #: Quantities that are drawn.
 _NAMES = ("contact_area", "friction_force")
@@ -95,14 +96,15 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
         dataset["speed"],
         data.sizes["member"],
     )
-    every = slice(None, None, -(-data.sizes["t"] // _DRAWN))
     if scene.drive.solves_motion or scene.contact.changes:
-        first = data.isel(member=0, t=every)
+        first = data.isel(member=0)
+        first = first.isel(t=_extremes([first[name].to_numpy() for name in _NAMES]))
         curves = {str(name): {"mean": listed(values)} for name, values in first.items()}
         return {"along": "t", "t": listed(first["t"]), "curves": curves, "members": 1}
     if float(np.ptp(speed.to_numpy())) == 0.0:
         data = data.isel(t=slice(data.sizes["t"] // 2, None)).mean("t").expand_dims("t")
         speed = speed.isel(t=slice(-1, None))
+    every = slice(None, None, -(-data.sizes["t"] // _DRAWN))
     data, speed = data.isel(t=every), speed.isel(t=every)
     mean, spread = data.mean("member"), xr.zeros_like(data.mean("member"))
     if members > 1:
@@ -122,6 +124,18 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
         "curves": curves,
         "members": members,
     }
+
+
+def _extremes(traces: list[Array]) -> Array:
+    """Return the places of the least and the largest value of each trace in each of many intervals, and both ends."""
+    size = len(traces[0])
+    places = {0, size - 1}
+    for part in np.array_split(np.arange(size), min(size, _DRAWN)):
+        for trace in traces:
+            known = part[np.isfinite(trace[part])]
+            if known.size:
+                places |= {known[trace[known].argmin()], known[trace[known].argmax()]}
+    return np.array(sorted(places))
 
 
 def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:

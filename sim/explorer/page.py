@@ -1,7 +1,7 @@
 """The state of a page and its answers: sliders of a scenario, curves of steady sliding, and sentences about them."""
 
 import contextlib
-import functools
+import itertools
 import math
 import secrets
 import time
@@ -13,9 +13,10 @@ import numpy as np
 
 from sim.ensemble.diagnosis import diagnosis, over_band, remarks
 from sim.ensemble.plan import Plan, seconds_a_step
-from sim.ensemble.steady import sensitivities
 from sim.explorer.drawing import listed
+from sim.explorer.motion import Motions
 from sim.parts.exchange import Array
+from sim.scenario.files import question_of
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import entries, quantities
 from sim.scenario.sweep import rows
@@ -29,14 +30,29 @@ if TYPE_CHECKING:
 
 #: Points of a curve, and speeds at which a key is tried; change of a curve that counts.
 _POINTS, _TRIED, _CHANGE = 121, 9, 1e-9
-#: Tables whose numbers do not change the curves, and those of the numerics of a table.
-_NO_SLIDERS = ("clock", "drive", "ensemble", "instrument", "record", "seed", "zero")
+#: Tables whose numbers have no slider, and one whose numbers change the motion alone.
+_NO_SLIDERS = ("clock", "ensemble", "instrument", "record", "seed", "zero")
+_DRIVE, _NUMERICS = "drive", ("drive.tolerance",)
 #: Ends of a slider over the value of its key: of a positive key, and of one that may be zero.
 _FACTOR, _TIMES = 30.0, 4.0
-#: Loads of further curves over the scenario's; members of the band, and time that it may take [s].
-_LOADS, _FEW, _QUICK = (0.25, 4.0), 8, 0.05
+#: Loads of further curves over the scenario's; most curves of other points of a sweep.
+_LOADS, _MOST_OTHERS = (0.25, 4.0), 8
+#: Members of the band, time that it may take [s], and time after which it is tried again [s].
+_FEW, _QUICK, _PAUSE = 8, 0.05, 5.0
 #: Keys that matter most for the area and are marked; tables that are kept.
 _MARKED, _KEPT = 3, 8
+#: Shares of the mechanisms in the work of adhesion; 0 switches a mechanism off.
+_MECHANISMS = {
+    "adhesion.bond_share": "broken bonds",
+    "shear.paid_by_adhesion": "fluctuations",
+    "contact.reversible": "mean stress",
+}
+#: Shares of the lost area that a mechanism has, by the order in which mechanisms are subtracted.
+_LOST = {
+    "bonds": ("lost_to_bonds", "lost_to_bonds_last"),
+    "fluctuations": ("lost_to_fluctuations", "lost_to_fluctuations_first"),
+    "mean stress": ("lost_to_mean_stress",),
+}
 #: Curves of the page that are not shares of an area, with their SI unit.
 _UNITS = {
     "work_of_adhesion": "J/m^2",
@@ -58,7 +74,6 @@ class Slider(NamedTuple):
     symbol: str
     unit: str
     value: float
-    text: str
     low: float
     high: float
     logarithmic: bool
@@ -80,7 +95,7 @@ class Page:
     Parameters
     ----------
     scenario : Scenario
-        What is explored; of a sweep the first point.
+        Scenario that is explored; of a sweep the numbers outside the table ``[sweep]``.
     data : Path, optional
         A table of measured curves that is shown from the start.
 
@@ -92,21 +107,56 @@ class Page:
 
     def __init__(self, scenario: Scenario, data: Path | None = None) -> None:
         self._asked, self.tables = scenario, dict[str | None, "Measured"]()
-        self.scenario = scenario.points()[0].with_values({})
+        self.scenario = scenario.with_values({})
         self.speeds = _speeds(self.scenario)
+        self.axis = _axis(scenario)
         self.sliders = list(self._sliders())
-        self._times: list[float] = []
+        self.motions = Motions()
+        self._time, self._measured = 0.0, -math.inf
         self._first = None if data is None else self.add(data, str(data))
 
+    @property
+    def figures(self) -> list[str]:
+        """Figures of the page, first the one that shows what the scenario computes."""
+        if any(previews(self.scenario)):
+            return ["motion", "speed"]
+        return [*(["sweep"] if self.axis else []), "speed"]
+
     def start(self) -> dict[str, Any]:
-        """Return what the page needs once: title, sliders, and why its curves are a preview alone."""
+        """Return what the page needs once, such as title, question, sliders, and points of the sweep."""
+        known = quantities(self.scenario)
+        points = [
+            {
+                key: known[key][0].read(value)
+                for key, value in row.items()
+                if key in known
+            }
+            for row in (rows(self._asked.sweep) if self._asked.sweep else [])
+        ]
         return {
             "title": self.scenario.name,
+            "question": question_of(self._asked.source.text)[0],
+            "path": self._asked.source.path,
             "sliders": [slider._asdict() for slider in self.sliders],
+            "points": points if self._is_slidable(points) else [],
+            "mechanisms": [
+                {"key": key, "name": name, "on": known[key][1] or 1.0}
+                for key, name in _MECHANISMS.items()
+                if any(slider.key == key for slider in self.sliders)
+            ],
+            "figures": self.figures,
+            "duration": self.scenario.clock.duration,
+            "speed": float(np.abs(self.scenario.speeds(2)[-1]))
+            or float(self.speeds[0]),
+            "mount": self.scenario.contact.kind,
             "preview": list(previews(self.scenario)),
             "members": self.scenario.ensemble.members,
             "data": self._first,
         }
+
+    def _is_slidable(self, points: list[dict[str, float]]) -> bool:
+        keys = {slider.key for slider in self.sliders}
+        return bool(points) and all(point and point.keys() <= keys for point in points)
 
     def read(self, values: Mapping[str, Any], built: bool = True) -> Scenario:
         """Return the scenario with numbers [SI], or text with units, by key; ``built`` as of ``Scenario.with_values``.
@@ -137,55 +187,109 @@ class Page:
         self,
         values: Mapping[str, Any],
         share: float,
-        loads: bool = False,
+        figure: str = "speed",
         table: str | None = None,
     ) -> dict[str, Any]:
-        """Return curves [SI] for values of the sliders, and the speeds at which a share of the area is lost in words.
+        """Return the curves [SI] of a figure, and where a share of the area is lost in words.
 
-        ``loads`` adds curves at other loads, ``table`` the points of a table by its name.
+        The curves are over the sliding speed, or for the figure "sweep" over a number of the sweep at the scenario's
+        own speed. ``table`` adds the points of a table by its name.
         """
         scene = self.read(values, built=False)
-        now, columns = quantities(scene), curves(scene, self.speeds)
+        measured = self.tables.get(table)
+        swept = self.axis if figure == "sweep" else None
+        x = self._places(swept, measured)
+        columns = self._over(scene, swept, x)
         largest = {
             name: float(np.nanmax(np.abs(columns[name]), initial=0.0))
             for name in _UNITS
         }
         energies = ("work_of_adhesion", "fluctuation_energy")
         largest |= dict.fromkeys(energies, max(largest[name] for name in energies))
-        crossings = speeds_of_loss(scene, share, self.speeds)
+        crossings = [] if swept else speeds_of_loss(scene, share, x)
+        now = quantities(scene)
         result: dict[str, Any] = {
-            "values": {
-                key: (now[key][1], engineering(now[key][1], unit))
-                for key, _, _, unit, *_ in self.sliders
-            },
-            "speed": self.speeds.tolist(),
+            "values": {slider.key: now[slider.key][1] for slider in self.sliders},
+            "x": x.tolist(),
+            "axis": _described(scene, swept, x),
             "curves": {name: listed(column) for name, column in columns.items()},
             "units": {
                 name: scaled(largest[name], unit) for name, unit in _UNITS.items()
             },
-            "level": {"speeds": crossings, "words": _loss(scene, share, crossings)},
+            "level": {
+                "places": crossings,
+                "words": _loss(scene, share, crossings, (x, columns, swept)),
+            },
         }
-        result["units"]["speed"] = scaled(
-            float(np.sqrt(self.speeds[0] * self.speeds[-1])), "m/s"
-        )
-        if loads and scene.contact.load is not None and not scene.contact.changes:
-            result["loads"] = list(self._other_loads(scene))
-        if measured := self.tables.get(table):
+        if measured and not swept:
             from sim.explorer.data import compared
 
             result["data"] = compared(scene, measured)
         return result
 
-    def _other_loads(self, scene: Scenario) -> Iterator[dict[str, Any]]:
-        """Yield other loads, with their curves, at which the scenario can be run."""
-        for load in (factor * float(scene.contact.load or 0.0) for factor in _LOADS):
+    def _places(self, swept: str | None, measured: "Measured | None") -> Array:
+        """Return the numbers [SI] of a figure's axis; speeds reach to those of a table of measured curves."""
+        if swept:
+            quantity = quantities(self.scenario)[swept][0]
+            axis = next(axis for axis in self._asked.sweep if axis.keys[0] == swept)
+            return np.array(sorted({quantity.read(row[0]) for row in axis.values}))
+        conditions = measured.conditions if measured else {}
+        moving = [speed for speed in np.abs(conditions.get("speed", [])) if speed > 0.0]
+        ends = [self.speeds[0], self.speeds[-1], *moving]
+        return np.geomspace(min(ends), max(ends), _POINTS)
+
+    def _over(self, scene: Scenario, swept: str | None, x: Array) -> dict[str, Array]:
+        """Return the curves of a scenario over its speed, or over another number at its speed."""
+        if swept is None:
+            return curves(scene, x)
+        speed = np.abs(scene.speeds(2)[-1:])
+        each = [
+            curves(scene.with_values({swept: place}, built=False), speed) for place in x
+        ]
+        return {name: np.concatenate([one[name] for one in each]) for name in each[0]}
+
+    def others(
+        self, values: Mapping[str, Any], figure: str = "speed", loads: bool = False
+    ) -> dict[str, Any]:
+        """Return curves [SI] at the other points of the sweep and, if wanted, at other loads, with their labels."""
+        scene = self.read(values, built=False)
+        swept = self.axis if figure == "sweep" else None
+        x, load = self._places(swept, None), scene.contact.load
+        changes = list(self._other_points(scene, swept))
+        if loads and load is not None and not scene.contact.changes:
+            changes += [{"contact.load": factor * float(load)} for factor in _LOADS]
+        drawn = ("contact_area", "area_ratio", "friction_force")
+        own = self._over(scene, swept, x) if changes else {}
+        result = []
+        for change in changes:
             with contextlib.suppress(BadInput):
-                other = curves(scene.with_values({"contact.load": load}), self.speeds)
-                drawn = {
-                    name: listed(other[name])
-                    for name in ("contact_area", "area_ratio", "friction_force")
-                }
-                yield {"load": engineering(load, "N"), "curves": drawn}
+                found = self._over(scene.with_values(change, built=False), swept, x)
+                if all(_is_close(found[name], own[name]) for name in drawn):
+                    continue
+                columns = {name: listed(found[name]) for name in drawn}
+                label = _words_of(scene, change)
+                result.append({"label": label, "curves": columns})
+        return {"x": x.tolist(), "others": result}
+
+    def _other_points(self, scene: Scenario, swept: str | None) -> Iterator[Any]:
+        """Yield the changes of a scenario to the other points of its sweep, at most eight."""
+        axes = [
+            axis
+            for axis in self._asked.sweep
+            if axis.keys[0] != swept and not axis.keys[0].startswith("drive.")
+        ]
+        known = quantities(scene)
+        points = (
+            list(itertools.product(*(axis.values for axis in axes))) if axes else []
+        )
+        for point in points if len(points) <= _MOST_OTHERS else []:
+            keys = itertools.chain.from_iterable(axis.keys for axis in axes)
+            change = dict(zip(keys, itertools.chain.from_iterable(point), strict=True))
+            numbers = {
+                key: known[key][0].read(x) for key, x in change.items() if key in known
+            }
+            if any(number != known[key][1] for key, number in numbers.items()):
+                yield numbers
 
     def band(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the band of a few members of the scenario's own models; empty if that takes too long to follow."""
@@ -197,13 +301,14 @@ class Page:
             for scene in scenes
         )
         # the first run also loads and compiles, and the estimate is rough
-        if estimate > 10.0 * _QUICK or (
-            len(self._times) > 1 and min(self._times) > _QUICK
-        ):
-            return {}
+        is_recent = time.monotonic() - self._measured < _PAUSE
+        if estimate > 10.0 * _QUICK or (is_recent and self._time > _QUICK):
+            return {"reason": "eight members take too long to follow the sliders"}
         began = time.perf_counter()
         result = ensemble(scenes, lambda message: None)
-        self._times = [*self._times[-1:], time.perf_counter() - began]
+        elapsed = time.perf_counter() - began
+        self._time = 0.0 if self._measured == -math.inf else elapsed
+        self._measured = time.monotonic()
         return result
 
     def scenes(self, values: Mapping[str, Any], members: int) -> list[Scenario]:
@@ -234,19 +339,13 @@ class Page:
             for key, (_, value) in quantities(scene).items()
             if value != known[key][1]
         }
-        first = rows(self._asked.sweep)[0] if self._asked.sweep else {}
-        return take.toml(self._asked, changed, self._asked.source.overrides | first)
+        return take.toml(self._asked, changed, self._asked.source.overrides)
 
-    def take(self, values: Mapping[str, Any], kind: str) -> Any:
-        """Return the curves for values of the sliders as a table for the kind "csv", else as a picture."""
+    def csv(self, values: Mapping[str, Any]) -> str:
+        """Return the curves for values of the sliders as a table."""
         from sim.explorer import take
 
-        scene = self.read(values)
-        return (
-            take.table(scene, self.speeds)
-            if kind == "csv"
-            else take.picture(scene, self.speeds, kind)
-        )
+        return take.table(self.read(values), self.speeds)
 
     def words(self, values: Mapping[str, Any]) -> dict[str, list[str]]:
         """Return the diagnosis and the remarks of ``sim check`` for values of the sliders."""
@@ -258,24 +357,25 @@ class Page:
         known = quantities(self.scenario)
         tried = np.geomspace(self.speeds[0], self.speeds[-1], _TRIED)
         before = curves(self.scenario, tried)
-        middle = float(tried[len(tried) // 2])
-        order = sorted(
-            sensitivities(self.scenario, 0.0, middle).items(),
-            key=lambda item: -abs(item[1][0]),
-        )
-        marked = [key for key, (area, _) in order if key != "speed" and area][:_MARKED]
-        for key, (quantity, value) in known.items():
-            known_to_stay = quantity.whole or key.partition(".")[0] in _NO_SLIDERS
-            if known_to_stay or not _changes(self.scenario, key, tried, before):
+        is_moving = any(previews(self.scenario))
+        effects = {
+            key: _effect(self.scenario, key, tried, before)
+            for key, (quantity, _) in known.items()
+            if not quantity.whole
+            and key not in _NUMERICS
+            and key.partition(".")[0] not in _NO_SLIDERS
+        }
+        order = sorted(effects, key=lambda key: -(effects[key] or 0.0))
+        marked = [key for key in order if effects[key]][:_MARKED]
+        for key, effect in effects.items():
+            is_drive = key.partition(".")[0] == _DRIVE
+            if key != "contact.load" and (
+                not is_moving if is_drive else effect is None and not is_moving
+            ):
                 continue
+            quantity, value = known[key]
             low, high, logarithmic = _ends(self.scenario, key, quantity, value)
-            shown = (
-                quantity.meaning,
-                quantity.symbol,
-                quantity.unit,
-                value,
-                engineering(value, quantity.unit),
-            )
+            shown = quantity.meaning, quantity.symbol, quantity.unit, value
             more = (
                 over_band(self.scenario.fluctuations.spectrum)
                 if key == "shear.spectrum.length"
@@ -322,21 +422,73 @@ def _speeds(scenario: Scenario) -> Array:
     return np.geomspace(low / wider, high * wider, _POINTS)
 
 
-def _changes(
+def _effect(
     scenario: Scenario, key: str, speeds: Array, before: dict[str, Array]
-) -> bool:
-    """Return True if another value of a key, a little smaller or larger, changes a curve."""
-    value = quantities(scenario)[key][1]
-    for other in (0.99 * value, 1.01 * value) if value else (0.01, -0.01, 1e-6, -1e-6):
+) -> float | None:
+    """Return the largest change of the share of the area if a key is a tenth smaller or larger; None without a change.
+
+    A key that is 0 becomes a tenth of its usual value. None also means that no curve changes at all.
+    """
+    quantity, value = quantities(scenario)[key]
+    size = abs(value) or abs(quantity.read(quantity.example.strip('"')))
+    result = None
+    for other in (value - 0.1 * size, value + 0.1 * size):
         try:
+            quantity.read(other)
             after = curves(scenario.with_values({key: other}, built=False), speeds)
-        except BadInput:
+        except ValueError:
             continue
-        close = functools.partial(np.allclose, rtol=_CHANGE, atol=0.0, equal_nan=True)
-        return after.keys() != before.keys() or not all(
-            close(after[name], before[name]) for name in before
-        )
-    return False
+        if after.keys() != before.keys() or not all(
+            _is_close(after[name], before[name]) for name in before
+        ):
+            lost = np.nan_to_num(after["area_ratio"]) - np.nan_to_num(
+                before["area_ratio"]
+            )
+            result = max(result or 0.0, float(np.max(np.abs(lost))))
+    return result
+
+
+def _is_close(one: Array, other: Array) -> bool:
+    return np.allclose(one, other, rtol=_CHANGE, atol=0.0, equal_nan=True)
+
+
+def _axis(scenario: Scenario) -> str | None:
+    """Return the number of a sweep that is the axis of a figure: that of the longest axis, in steady sliding."""
+    known = quantities(scenario)
+    axes = [
+        axis
+        for axis in scenario.sweep
+        if len(axis.keys) == 1
+        and axis.keys[0] in known
+        and axis.keys[0] != "drive.speed"
+    ]
+    if scenario.drive.model != "steady" or not axes:
+        return None
+    return max(axes, key=lambda axis: len(axis.values)).keys[0]
+
+
+def _described(scenario: Scenario, swept: str | None, x: Array) -> dict[str, Any]:
+    """Return name, symbol, factor, unit and scale of the axis of a figure."""
+    if swept is None:
+        middle = float(np.sqrt(x[0] * x[-1]))
+        name, symbol, unit, log = "sliding speed", "V", scaled(middle, "m/s"), True
+    else:
+        quantity = quantities(scenario)[swept][0]
+        name, symbol = quantity.meaning, quantity.symbol
+        unit = scaled(float(np.max(np.abs(x))), quantity.unit)
+        steps, ratios = np.diff(x), x[1:] / np.where(x[:-1] > 0.0, x[:-1], np.nan)
+        log = bool(np.ptp(ratios) < np.ptp(steps) / np.max(np.abs(x)))
+    return {"name": name, "symbol": symbol, "unit": unit, "log": log}
+
+
+def _words_of(scenario: Scenario, change: Mapping[str, float]) -> str:
+    """Return numbers of a scenario in words, by their symbols."""
+    words = []
+    for key, value in change.items():
+        quantity = quantities(scenario)[key][0]
+        name = quantity.symbol or key.rpartition(".")[2].replace("_", " ")
+        words.append(f"{name} = {engineering(value, quantity.unit)}")
+    return ", ".join(words)
 
 
 def _ends(
@@ -362,22 +514,50 @@ def _ends(
     return -_TIMES * size, _TIMES * size, False
 
 
-def _loss(scenario: Scenario, share: float, speeds: list[float]) -> str:
-    """Return where a share of the area is lost, and to what, in words."""
-    lost = f"{100.0 * share:.3g} %"
-    if not speeds:
-        return f"{lost} of the area is lost at no speed shown"
-    at = curves(scenario, np.array(speeds[:1]))
-    names = {
-        "bonds": "lost_to_bonds",
-        "fluctuations": "lost_to_fluctuations",
-        "mean stress": "lost_to_mean_stress",
+def _loss(
+    scenario: Scenario,
+    share: float,
+    speeds: list[float],
+    drawn: tuple[Array, dict[str, Array], str | None],
+) -> str:
+    """Return where a share of the area is lost, and to what, in words.
+
+    ``drawn`` holds the numbers of the axis, the curves over them, and the key of the axis if it is no speed.
+    """
+    x, columns, swept = drawn
+    lost = 100.0 * (1.0 - columns["area_ratio"])
+    if not np.any(lost < 100.0):
+        return "The contact is open everywhere in this figure"
+    limit, least, most = 100.0 * share, np.nanmin(lost), np.nanmax(lost)
+    place = "speed" if swept is None else "value"
+    if np.all(lost[np.isfinite(lost)] >= limit):
+        return f"{limit:.3g} % or more of the area is lost at every {place} shown: {least:.3g} to {most:.3g} %"
+    if not np.any(lost >= limit):
+        return f"Less than {limit:.3g} % of the area is lost at every {place} shown: at most {most:.3g} %"
+    if swept is not None:
+        first = int(np.flatnonzero(np.diff(lost >= limit))[0])
+        ends = [
+            engineering(float(end), _unit(scenario, swept))
+            for end in x[first : first + 2]
+        ]
+        return f"{limit:.3g} % of the area is lost between {ends[0]} and {ends[1]}"
+    at = {
+        name: column[0]
+        for name, column in curves(scenario, np.array(speeds[:1])).items()
     }
-    points = [
-        f"{word} {100.0 * at[name][0]:.1f}"
-        for word, name in names.items()
-        if name in at
-    ]
+    points = []
+    for word, names in _LOST.items():
+        shares = sorted(100.0 * at[name] for name in names if name in at)
+        if shares:
+            low, high = f"{shares[0] + 0.0:.1f}", f"{shares[-1] + 0.0:.1f}"
+            points.append(f"{word} {low}" if low == high else f"{word} {low} to {high}")
+    order = (
+        ", by the order of subtraction" if any(" to " in one for one in points) else ""
+    )
     others = [engineering(speed, "m/s") for speed in speeds[1:]]
     again = f"; again at {', '.join(others)}" if others else ""
-    return f"{lost} lost at {engineering(speeds[0], 'm/s')}: {', '.join(points)} points{again}"
+    return f"{limit:.3g} % lost at {engineering(speeds[0], 'm/s')}: {', '.join(points)} points{order}{again}"
+
+
+def _unit(scenario: Scenario, key: str) -> str:
+    return quantities(scenario)[key][0].unit

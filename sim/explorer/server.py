@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, cast
 from urllib.parse import parse_qsl, urlencode
 
-import plotly
 import uvicorn
 from pydantic import BaseModel, Field, ValidationError
 from starlette.concurrency import run_in_threadpool
@@ -35,10 +34,10 @@ from sim.units.errors import BadInput
 _MOST_BYTES, _MOST_JOBS = 4_200_000, 2
 _RUN = "/run"
 #: Words of an address that are none of a slider, and most words of an address.
-_VIEW, _MOST_FIELDS = ("share", "absolute", "first", "loads"), 200
-#: Types of the files of the page, and of its pictures.
+_VIEW, _MOST_FIELDS = ("share", "absolute", "first", "loads", "figure"), 200
+#: Figures of a page; types of its files.
+_FIGURES = ("motion", "sweep", "speed")
 _TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
-_PICTURES = {"png": "image/png", "svg": "image/svg+xml", "pdf": "application/pdf"}
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline'; connect-src 'self';"
     " img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; require-trusted-types-for 'script';"
@@ -53,11 +52,13 @@ class Query(BaseModel, extra="forbid", allow_inf_nan=False, strict=True):
     values: Annotated[dict[str, float | str], Field(max_length=100)] = {}
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
     loads: bool = False
+    figure: Literal["speed", "sweep"] = "speed"
+    run: Annotated[str, Field(max_length=32)] = ""
+    step: Annotated[int, Field(ge=0)] = 0
     data: str | None = None
     text: str = ""
     name: Annotated[str, Field(max_length=300)] = ""
     speed: Annotated[float, Field(gt=0.0, lt=1e6)] = 1.0
-    kind: Literal["png", "svg", "pdf"] = "png"
     task: Literal["ensemble", "fit"] = "ensemble"
     members: Annotated[int, Field(ge=1, le=100_000)] = 1
     free: Annotated[list[str], Field(max_length=20)] = []
@@ -74,7 +75,7 @@ class Guarded:
         self.token = secrets.token_urlsafe(32)
         self._page, self._locks = (
             page,
-            {True: threading.Lock(), False: threading.Lock()},
+            {path: threading.Lock() for path in ("/curves", "/motion", "")},
         )
         self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
         static = Path(__file__).with_name("static").iterdir()
@@ -82,9 +83,6 @@ class Guarded:
             f"/{path.name}": path for path in static if path.suffix[1:] in _TYPES
         }
         self._files["/"] = self._files.pop("/page.html")
-        self._files["/plotly.js"] = (
-            Path(plotly.__file__).with_name("package_data") / "plotly.min.js"
-        )
         self._headers = {
             "content-security-policy": _POLICY + (_NOTEBOOKS if framed else "'none'"),
             "x-content-type-options": "nosniff",
@@ -95,15 +93,20 @@ class Guarded:
         self._answers: dict[str, Callable[[Query], Any]] = {
             "/start": lambda query: page.start(),
             "/curves": lambda query: page.answer(
-                query.values, query.share, query.loads, query.data
+                query.values, query.share, query.figure, query.data
+            ),
+            "/others": lambda query: page.others(
+                query.values, query.figure, query.loads
+            ),
+            "/motion": lambda query: page.motions.advance(
+                page.read(query.values), query.run, query.step
             ),
             "/words": lambda query: page.words(query.values),
             "/band": lambda query: page.band(query.values),
             "/contact": lambda query: contact(page.read(query.values), query.speed),
             "/data": lambda query: {"data": page.add(query.text, query.name)},
             "/toml": lambda query: {"text": page.toml(query.values)},
-            "/csv": lambda query: {"text": page.take(query.values, "csv")},
-            "/picture": lambda query: page.take(query.values, query.kind),
+            "/csv": lambda query: {"text": page.csv(query.values)},
         }
         self._places, self._jobs = asyncio.Semaphore(_MOST_JOBS), set[Process]()
 
@@ -120,12 +123,7 @@ class Guarded:
                     await self._stream(query, scope, receive, send)
                     return
                 content = await run_in_threadpool(self._answer, scope["path"], query)
-                is_table = isinstance(content, dict)
-                answer = (
-                    JSONResponse(content)
-                    if is_table
-                    else Response(content, media_type=_PICTURES[query.kind])
-                )
+                answer = JSONResponse(content)
         except Refused as fault:
             answer = JSONResponse({"message": fault.detail}, fault.status_code)
         except ValidationError:
@@ -232,8 +230,8 @@ class Guarded:
             raise Refused(403, "no JSON")
 
     def _answer(self, path: str, query: Query) -> Any:
-        # curves wait for no slow answer; the rest take turns, because matplotlib is not made for several threads
-        with self._locks[path == "/curves"]:
+        # curves and motions wait for no slow answer; the rest take turns, because their first ones import modules
+        with self._locks[path if path in self._locks else ""]:
             return self._answers[path](query)
 
 
@@ -298,7 +296,9 @@ def state_of(link: str, page: Page) -> str:
     )
     words.pop("token", None)
     try:
-        numbers = {key: float(word) for key, word in words.items()}
+        if words.get("figure", _FIGURES[0]) not in _FIGURES:
+            raise ValueError("no figure of a page")
+        numbers = {key: float(word) for key, word in words.items() if key != "figure"}
         page.read({key: number for key, number in numbers.items() if key not in _VIEW})
     except ValueError as fault:
         cure = "copy the whole address of a page of this scenario"

@@ -3,7 +3,6 @@
 import contextlib
 import html as markup
 import io
-import itertools
 import json
 import re
 import shlex
@@ -31,7 +30,7 @@ from sim.read.run import Run
 from sim.read.statistics import over_members
 from sim.read.tables import figure, key_figures, notes, tables_of
 from sim.reports.methods import errors, is_estimated, methods, rendered
-from sim.scenario.files import toml
+from sim.scenario.files import question_of, toml
 from sim.units.errors import naming
 from sim.units.notation import engineering
 
@@ -335,8 +334,5 @@ def headed(dataset: xr.Dataset) -> tuple[str, str, list[str]]:
     """
     text = str(dataset.attrs.get("scenario_toml", ""))
     name = str(dataset.attrs.get("title", "")) or "A run of sim"
-    comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
-    lines = [line[1:].strip() for line in comment if not line.startswith("#:")]
-    before, made, after = "\n".join(lines).partition(_MADE)
-    question = " ".join(before.strip().partition("\n\n")[0].split())
-    return name, question or name, (made + after).splitlines()
+    question, made = question_of(text, _MADE)
+    return name, question or name, made

@@ -1,6 +1,7 @@
 """Files of a scenario: its TOML text, its origin, and the files that it names."""
 
 import errno
+import itertools
 import json
 import re
 import tomllib
@@ -174,3 +175,15 @@ class Files:
         if name not in self.texts:
             self.texts[name] = plain_text(self.path(name))
         return self.texts[name]
+
+
+def question_of(text: str, made: str = "\n\n") -> tuple[str, list[str]]:
+    """Return the question of a scenario's file and the lines of its first comment from a word ``made`` on.
+
+    The question is the first paragraph of the comment. Lines for editors are no part of it.
+    """
+    comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    lines = [line[1:].strip() for line in comment if not line.startswith("#:")]
+    before, made, after = "\n".join(lines).partition(made)
+    question = " ".join(before.strip().partition("\n\n")[0].split())
+    return question, (made + after).splitlines()

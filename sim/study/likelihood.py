@@ -84,7 +84,8 @@ class Measured(NamedTuple):
     ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"mount"`` (load, indentation or displacement),
     ``"tangential_force"`` and those of other keys of the scenario. Rows have the same numbers in all columns. ``mount``
     is the key of the contact that holds the sphere. The first ``baseline`` rows were measured before the contact;
-    ``noise`` is that of curves there. ``jumps`` are the readings at the jump into contact.
+    ``noise`` is that of curves there. ``jumps`` are the readings at the jump into contact. ``remark`` states that a
+    table without units was read in SI.
     """
 
     path: Path
@@ -94,6 +95,7 @@ class Measured(NamedTuple):
     baseline: int = 0
     noise: Mapping[str, Noise] = MappingProxyType({})
     jumps: tuple[Reading, ...] = ()
+    remark: str = ""
 
     @property
     def has_history(self) -> bool:
@@ -171,7 +173,7 @@ def read(
             name: quantity for name, quantity in outcomes.items() if name not in at
         }
     known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
-    result, _ = read_measured(
+    result, remark = read_measured(
         path, known, outcomes, is_planned=bool(planned), instrument=scenario.instrument
     )
     conditions = {
@@ -184,7 +186,7 @@ def read(
     curves = curves or tuple(Curve(name, unknown, None) for name in planned)
     for fault in faults_of(scenario, conditions, curves):
         raise BadInput([f"{path}: {fault}"])
-    table = Measured(path, scenario.contact.kind, conditions, curves)
+    table = Measured(path, scenario.contact.kind, conditions, curves, remark=remark)
     try:
         if scenario.jump_in is not None:
             table = table._replace(jumps=scenario.jump_in.readings(*place))

@@ -142,10 +142,10 @@ def test_sliders_are_numbers_that_change_a_curve_between_ends_within_their_bound
             assert slider.low > 0.0
     keys = {slider.key for slider in page.sliders}
     assert not {
-        key
-        for key in keys
-        if key.startswith(("clock", "drive", "ensemble", "record", "seed"))
+        key for key in keys if key.startswith(("clock", "ensemble", "record", "seed"))
     }
+    moves = page.figures[0] == "motion"
+    assert any(key.startswith("drive.") for key in keys) == moves
     assert ("bonds.critical_speed" in keys) == (
         name in ("pdms_lens", "masking") and name != "masking"
     )
@@ -220,7 +220,7 @@ def test_values_of_the_page_are_those_of_a_run_of_the_saved_scenario(lens):
     saved = lens.with_name("saved.toml")
     saved.write_text(page.toml(values), encoding="utf-8")
     for place in (0, 60, 120):
-        run = sim.run(sim.load(saved, {"drive.speed": answer["speed"][place]}))
+        run = sim.run(sim.load(saved, {"drive.speed": answer["x"][place]}))
         for name in (
             "contact_area",
             "friction_force",
@@ -235,7 +235,7 @@ def test_values_of_the_page_are_those_of_a_run_of_the_saved_scenario(lens):
 @pytest.mark.parametrize("name", ["own_psd", "soft_lens", "ten_wavelengths"])
 def test_values_of_the_page_lie_within_the_error_of_the_scenarios_own_models(name):
     # the interval is of 95 %: twice its half are four standard errors
-    page = Page(sim.load(f"scenarios/{name}.toml"))
+    page = Page(sim.load(f"scenarios/{name}.toml").points()[0])
     own = ensemble(page.scenes({}, 64), lambda message: None)
     found = curves(page.scenario, np.array(own["speed"]))
     for quantity in ("contact_area", "friction_force"):
@@ -246,7 +246,7 @@ def test_values_of_the_page_lie_within_the_error_of_the_scenarios_own_models(nam
         assert np.all(high > low) or found[quantity] == 0.0
 
 
-def test_curves_are_taken_away_as_a_table_and_as_pictures(lens):
+def test_curves_are_taken_away_as_a_table(lens):
     page = Page(sim.load(lens))
     rows = list(csv.reader(io.StringIO(take.table(page.scenario, page.speeds))))
     column = rows[0].index("contact_area [m^2]")
@@ -255,15 +255,6 @@ def test_curves_are_taken_away_as_a_table_and_as_pictures(lens):
         curves(page.scenario, page.speeds)["contact_area"],
         rtol=0,
     )
-    for kind, magic in (("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")):
-        assert take.picture(page.scenario, page.speeds, kind).startswith(magic)
-    area, energy, friction = take.figure(page.scenario, page.speeds).axes
-    assert_allclose(
-        area.lines[0].get_ydata(),
-        100.0 * curves(page.scenario, page.speeds)["area_ratio"],
-        rtol=1e-12,
-    )
-    assert friction.get_xscale() == "log" and "mJ" in energy.get_ylabel()
 
 
 def test_curves_and_their_comparison_with_a_table_need_no_process_of_the_fluctuations(
@@ -280,8 +271,7 @@ def test_curves_and_their_comparison_with_a_table_need_no_process_of_the_fluctua
     )
     answer = page.answer({"shear.spectrum.hurst": 0.7}, 0.1, table=table)
     assert (
-        answer["data"]["count"] == 2
-        and answer["values"]["shear.spectrum.hurst"][0] == 0.7
+        answer["data"]["count"] == 2 and answer["values"]["shear.spectrum.hurst"] == 0.7
     )
 
 
@@ -331,7 +321,7 @@ def test_a_band_that_takes_too_long_is_not_begun(lens):
     short, long = (
         Page(sim.load(lens, {"clock.duration": seconds})) for seconds in (1.0, 1e5)
     )
-    assert short.band({})["along"] == "speed" and long.band({}) == {}
+    assert short.band({})["along"] == "speed" and "too long" in long.band({})["reason"]
 
 
 @pytest.mark.parametrize(
@@ -353,6 +343,7 @@ def test_the_numbers_of_an_address_are_taken_and_its_token_is_not(lens, link):
         "#sphere.radius=inf",
         "#sphere.radius=-1",
         "#path=/etc",
+        "#figure=../x",
         "#a=" * 300,
     ],
 )
@@ -394,7 +385,7 @@ def test_another_command_imports_nothing_of_the_page(arguments):
     assert not [
         n
         for n in modules
-        if n.startswith(("sim.explorer", "starlette", "uvicorn", "plotly", "tomlkit"))
+        if n.startswith(("sim.explorer", "starlette", "uvicorn", "tomlkit"))
     ]
 
 
@@ -410,8 +401,8 @@ def test_the_command_names_the_extra_that_is_missing_and_a_browser_that_is(
     for name in [name for name in sys.modules if name.startswith("sim.explorer")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setattr(
-        "importlib.util.find_spec", lambda name: None if name == "plotly" else name
+        "importlib.util.find_spec", lambda name: None if name == "lmfit" else name
     )
     done = command("explore", "nothing.toml")
     assert done.exit_code == 2 and len(done.stderr.splitlines()) == 1
-    assert "plotly" in done.stderr and "[explore]" in done.stderr
+    assert "lmfit" in done.stderr and "[explore]" in done.stderr

@@ -91,8 +91,8 @@ def asked(server, token, path="/curves", **table):
 def test_the_page_gets_its_files_and_its_answers(server, token):
     for path, word in (
         ("/", b"<!doctype html>"),
-        ("/explore.js", b"use strict"),
-        ("/plotly.js", b"plotly"),
+        ("/explore.js", b"import"),
+        ("/figure.js", b"export"),
     ):
         status, body = request(server, "GET", path, None)
         assert status == 200 and word in body and token.encode() not in body
@@ -103,6 +103,11 @@ def test_the_page_gets_its_files_and_its_answers(server, token):
     assert remark.startswith("the mean stress is 0.17 times the shear modulus")
     assert asked(server, token, "/contact", speed=1e-3)["radius"] > 1e-4
     assert asked(server, token, "/band")["along"] == "speed"
+    assert asked(server, token, "/others") == {
+        "x": asked(server, token)["x"],
+        "others": [],
+    }
+    assert asked(server, token, "/motion")["first"] == 0
     assert asked(server, token, values={"sphere.radius": "3 kg"})["faults"][
         "sphere.radius"
     ]
@@ -134,7 +139,7 @@ def test_a_request_that_is_not_the_pages_own_is_refused(server, token, changes):
         server, headers=[(n, v.encode("latin-1")) for n, v in good(token, **changes)]
     )
     assert status == 403 and b"a scene" not in body
-    assert asked(server, token)["speed"]  # the server still answers
+    assert asked(server, token)["x"]  # the server still answers
 
 
 @pytest.mark.parametrize("name", ["X-Token", "Content-Type", "Origin", "Host"])
@@ -235,7 +240,7 @@ def test_a_body_that_is_no_http_ends_in_one_refusal_without_a_trace(
             connection.sendall(b"no length\r\n")
         answer = b"".join(iter(functools.partial(connection.recv, 65536), b""))
     assert answer.count(b"HTTP/1.1 4") == 1
-    assert asked(server, token)["speed"]
+    assert asked(server, token)["x"]
     assert not log.records
 
 
@@ -313,17 +318,18 @@ BODIES = {
     "empty": b"",
     "null": b"null",
     "cut": b'{"values": {',
-    "kind": b'{"kind": "../x"}',
+    "figure": b'{"figure": "../x"}',
+    "step": b'{"step": -1}',
     "members": b'{"task": "ensemble", "members": 1e9}',
 }
 
 
 @pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 def test_a_malformed_body_is_refused(server, token, body):
-    for path in ("/curves", "/picture", "/run", "/data"):
+    for path in ("/curves", "/motion", "/run", "/data"):
         status, answer = request(server, path=path, body=body, headers=good(token))
         assert status == 400 and json.loads(answer)["message"]
-    assert asked(server, token)["speed"]
+    assert asked(server, token)["x"]
 
 
 @pytest.mark.parametrize(
@@ -350,7 +356,7 @@ def test_a_body_in_pieces_without_an_end_is_cut(server, token):
     headers = [*good(token), ("Transfer-Encoding", "chunked")]
     piece = b"%x\r\n%s\r\n" % (HUGE, b" " * HUGE)
     assert request(server, body=piece + b"0\r\n\r\n", headers=headers)[0] == 413
-    assert asked(server, token)["speed"]
+    assert asked(server, token)["x"]
 
 
 def test_all_answers_forbid_other_scripts_frames_and_addresses(server, token):
@@ -502,6 +508,6 @@ def test_a_reader_that_leaves_ends_its_job_and_a_third_job_is_refused():
             server, path="/run", body=json.dumps(long).encode(), headers=good(token)
         )
         assert status == 429 and b"stop one" in body
-        assert asked(server, token)["speed"]
+        assert asked(server, token)["x"]
     assert until(lambda: not workers())
     server.close()

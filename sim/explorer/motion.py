@@ -1,0 +1,118 @@
+"""The motion of the first member of a scenario, in blocks that go on while the numbers of the scenario change."""
+
+import secrets
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sim.ensemble.variables import READ
+from sim.explorer.drawing import listed
+from sim.scenario.scenario import Scenario
+from sim.step.state import MemberNoise, State, pack
+
+#: Motions that are kept; blocks of a motion; time of an answer [s]; digits of a number.
+_KEPT, _BLOCKS, _LONG, _DIGITS = 4, 100, 0.1, 6
+#: Quantities that are sent, those of a slider that is driven through a spring or by a force, and of a moving mount.
+_ALWAYS = (
+    "contact_area",
+    "contact_radius",
+    "friction_force",
+    "fluctuation_energy",
+    "speed",
+)
+_DRIVEN = ("slider_position",)
+_SPRING = ("stage_position", "spring_force")
+_MOUNT = ("normal_load", "indentation", "displacement")
+
+
+class _Motion(NamedTuple):
+    """States of a motion at the ends of its blocks, by their clock step."""
+
+    states: dict[int, State]
+    shapes: dict[str, tuple[int, ...]]
+
+
+class Motions:
+    """The motions of a page. A page keeps few, because each has many states."""
+
+    def __init__(self) -> None:
+        self._motions: dict[str, _Motion] = {}
+
+    def advance(self, scene: Scenario, run: str, step: int) -> dict[str, Any]:
+        """Advance a motion for a while under the present numbers of a scenario.
+
+        Parameters
+        ----------
+        scene : Scenario
+            Scenario with the present numbers.
+        run : str
+            Name of the motion; another name begins a new one.
+        step : int
+            Clock step at the end of a block, from which the motion goes on.
+
+        Returns
+        -------
+        dict
+            ``run``, ``first`` and ``last`` step, ``duration`` [s], ``is_new`` (True if the motion
+            began anew, because it is unknown or its arrays have other shapes), and ``columns`` in SI
+            by name, of which ``t`` is the time.
+        """
+        stepper, noise = scene.stepper, MemberNoise.of(scene.seed, np.arange(1))
+        start = stepper.start(noise)
+        shapes = {name: array.shape for name, array in pack(start).items()}
+        motion = self._motions.get(run)
+        is_new = motion is None or motion.shapes != shapes or step not in motion.states
+        if motion is None or is_new:
+            run, step = secrets.token_hex(8), 0
+            motion = _Motion({0: start}, shapes)
+            self._motions = dict([*self._motions.items()][1 - _KEPT :]) | {run: motion}
+        if step == 0:  # the start depends on the numbers
+            motion.states[0] = start
+        for later in [known for known in motion.states if known > step]:
+            del motion.states[later]
+        whole, state, courses = scene.clock.steps, motion.states[step], []
+        block, first, began = max(1, whole // _BLOCKS), step, time.perf_counter()
+        while step < whole and (step == first or time.perf_counter() - began < _LONG):
+            last = min(step + block, whole)
+            state, course = stepper.advance(
+                state, noise, range(step + bool(step), last + 1)
+            )
+            motion.states[last], step = state, last
+            courses.append(course)
+        names = _names(scene)
+        columns = {
+            name: [x for course in courses for x in _column(scene, course, name)]
+            for name in names
+        }
+        columns["t"] = [x for course in courses for x in _rounded(course.time[:, 0])]
+        return {
+            "run": run,
+            "first": first,
+            "last": step,
+            "duration": scene.clock.duration,
+            "steps": whole,
+            "is_new": bool(is_new),
+            "columns": columns,
+        }
+
+
+def _names(scene: Scenario) -> list[str]:
+    names = [*_ALWAYS, *(_MOUNT if scene.contact.changes else ())]
+    if scene.drive.solves_motion:
+        names += _DRIVEN
+        names += _SPRING if scene.drive.model == "spring" else ()
+    return names
+
+
+def _column(scene: Scenario, course: Any, name: str) -> list[float | None]:
+    values = np.broadcast_to(READ[name](scene, course), (len(course.time), 1))
+    return _rounded(values[:, 0])
+
+
+def _rounded(values: Any) -> list[float | None]:
+    """Return numbers of few digits as JSON has them."""
+    return [
+        None if value is None else float(f"{value:.{_DIGITS}g}")
+        for value in listed(values)
+    ]

@@ -1,0 +1,85 @@
+// Which questions the state asks, and whether an answer is one to them. No answer is drawn as that of other numbers.
+
+import { engineering, lettered } from "./notation.js";
+import { same } from "./state.js";
+
+/** @typedef {import("./state.js").State} State */
+/** @typedef {import("./state.js").Values} Values */
+
+/** @param {State} state */
+const drawn = ({ view }) => (view.figure === "sweep" ? "sweep" : "speed");
+
+/** Questions by the name of their answer, in the order in which they are asked.
+ * @type {Record<string, (state: State) => any>} */
+export const QUESTIONS = {
+  before: (state) => ({ values: {}, share: 0.1, figure: drawn(state) }),
+  curves: (state) => ({
+    values: state.values,
+    share: state.view.share,
+    figure: drawn(state),
+    data: state.table,
+  }),
+  others: (state) => ({ values: state.values, figure: drawn(state), loads: state.view.loads }),
+  words: (state) => ({ values: state.values }),
+  contact: (state) => ({ values: state.values, speed: speedOf(state) }),
+  // the first one imports modules for seconds
+  band: (state) => ({ values: state.values }),
+};
+
+/** Addresses of the server that differ from the name of the answer. */
+export const ADDRESSES = new Map([["before", "curves"]]);
+
+/** Return the speed at which the contact is drawn.
+ * @param {State} state */
+function speedOf(state) {
+  const curves = state.answers.curves?.answer;
+  if (!curves?.x || state.view.figure !== "speed") return state.start.speed;
+  return curves.level.places[0] ?? curves.x[Math.floor(curves.x.length / 2)];
+}
+
+/** Return true if the answer of a name is one to the present question.
+ * @param {State} state
+ * @param {string} name */
+export function isCurrent(state, name) {
+  const found = state.answers[name];
+  return Boolean(found) && same(found.of, QUESTIONS[name](state));
+}
+
+/** Return the answer of a name if it belongs to the present numbers and has no faults, else null.
+ * @param {State} state
+ * @param {string} name */
+export function current(state, name) {
+  const found = state.answers[name];
+  return found && isCurrent(state, name) && !found.answer.faults ? found.answer : null;
+}
+
+/** Return the names of answers that are due. What depends on the curves waits for them, and words for a gesture's end.
+ * @param {State} state */
+export function due(state) {
+  const names = Object.keys(QUESTIONS).filter((name) => !isCurrent(state, name));
+  if (names.includes("curves")) return names.filter((name) => name === "before" || name === "curves");
+  return state.dragging ? names.filter((name) => name !== "words" && name !== "contact") : names;
+}
+
+/** Return in words how numbers differ from the present ones, such as "P = 4 mN"; "" if they do not.
+ * @param {State} state
+ * @param {Values} of */
+export function differences({ start, values }, of) {
+  const words = start.sliders
+    .filter(({ key }) => key in of && of[key] !== values[key])
+    .map(({ key, symbol, unit }) => {
+      const name = symbol ? lettered(symbol).join("") : (key.split(".").at(-1) ?? key);
+      return `${name} = ${engineering(of[key], unit)}`;
+    });
+  return words.length > 3 ? `${words.slice(0, 3).join(", ")}, and ${words.length - 3} more` : words.join(", ");
+}
+
+/** Return what an ensemble is called in the figure: its members, and its numbers if they are not the present ones.
+ * @param {State} state */
+export function nameOfRun(state) {
+  if (!state.run) return "";
+  const { members } = state.run.answer;
+  const other = differences(state, state.run.of.values);
+  const name = members > 1 ? `own models, mean of ${members}` : "own models";
+  return other ? `ran at ${other}` : name;
+}
