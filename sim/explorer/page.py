@@ -532,6 +532,8 @@ def _loss(
     place = "speed" if swept is None else "value"
     if np.all(lost[np.isfinite(lost)] >= limit):
         return f"{limit:.3g} % or more of the area is lost at every {place} shown: {least:.3g} to {most:.3g} %"
+    if most < 1e-6:
+        return f"No area is lost at any {place} shown"
     if not np.any(lost >= limit):
         return f"Less than {limit:.3g} % of the area is lost at every {place} shown: at most {most:.3g} %"
     if swept is not None:

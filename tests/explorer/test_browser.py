@@ -12,12 +12,14 @@ import time
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 from helpers.commands import COUNTED, LENS, RAMP
 from numpy.testing import assert_allclose
 
 import sim
+from sim.study.curves import curves as steady
 
 playwright = pytest.importorskip("playwright.sync_api", reason="in the extra verify")
 CHROMIUM = next(
@@ -548,6 +550,319 @@ def test_a_scenario_that_steady_sliding_does_not_answer_opens_with_its_motion(
             "not called a preview",
         )
         assert page.locator("#preview").text_content().startswith(words)
+
+
+IDLE = """async () => {
+    const { due } = await import("/answer.js");
+    const { nextOfMotion } = await import("/state.js");
+    const { values, answers } = explored;
+    const plot = document.getElementById("plot").dataset;
+    return due(explored).length === 0 && nextOfMotion(explored) === null && plot.of === JSON.stringify(values);
+}"""
+
+
+def idle(page):
+    """Wait until all answers are those of the present numbers, and are drawn."""
+    wait(page, lambda: page.evaluate(IDLE), "never at rest")
+
+
+@pytest.fixture
+def random(browser, tmp_path):
+    """A page of a scene whose members differ."""
+    path = tmp_path / "random.toml"
+    path.write_text(LENS + RAMP + COUNTED, encoding="utf-8")
+    with explored(path) as (_, address), opened(browser, address) as page:
+        yield page
+
+
+@contextlib.contextmanager
+def scenario(browser, name, *options, **looks):
+    path = Path(sim.__file__).parents[1] / "scenarios" / f"{name}.toml"
+    with (
+        explored(path, *options) as (_, address),
+        opened(browser, address, **looks) as page,
+    ):
+        yield page
+
+
+LOAD = "contact.load"
+
+
+def run(page, members):
+    page.locator("#members").fill(str(members))
+    page.locator("#run").click()
+
+
+def test_an_ensemble_of_other_numbers_is_drawn_as_such(random):
+    run(random, 64)
+    enter(random, "16 mN", LOAD)
+    ran = random.locator("#ran")
+    wait(random, lambda: "64 members" in ran.text_content(), "no ensemble")
+    idle(random)
+    assert "of earlier numbers: ran at P = 4 mN" in ran.text_content()
+    assert random.locator("#plot [data-name=ran]").count()
+    assert "ran at P = 4 mN" in random.locator("#plot").text_content()
+    random.locator("#undo").click()
+    idle(random)
+    assert "earlier" not in ran.text_content()
+    assert not random.locator("#plot [data-name=ran]").count()
+    assert "own models, mean of 64" in random.locator("#plot").text_content()
+    random.locator("#members").fill("")
+    random.locator("#run").click()
+    wait(random, lambda: "between 1 and 100000" in ran.text_content(), "no reason")
+
+
+def points(path, speeds, key="bonds.critical_speed", value="5 mm/s"):
+    exact = sim.steady_curves(sim.load(path, {key: value}), speeds)
+    rows = zip(exact["speed"].to_numpy(), exact["contact_area"].to_numpy(), strict=True)
+    lines = [f"{1e3 * v},{1e6 * a},1" for v, a in rows]
+    return "\n".join(
+        ["speed [mm/s],contact_area [mm^2],contact_area_error [%]", *lines]
+    )
+
+
+@pytest.fixture
+def lens(tmp_path):
+    path = tmp_path / "lens.toml"
+    path.write_text(LENS + RAMP + BONDS, encoding="utf-8")
+    return path
+
+
+def test_a_fit_in_flight_moves_no_slider_of_another_state(browser, lens):
+    with explored(lens) as (_, address), opened(browser, address) as page:
+        drop(page, points(lens, [1e-3, 3e-3, 1e-2]), "own.csv")
+        wait(page, lambda: "χ²" in page.locator("#judged").text_content(), "no points")
+        page.locator("#fit").click()
+        assert "tick the numbers" in page.locator("#unfit").text_content()
+        page.locator("#free input[value='bonds.critical_speed']").check()
+        page.locator("#fit").click()
+        enter(page, "16 mN", LOAD)
+        wait(page, lambda: page.locator("#fitted").is_visible(), "no fit")
+        idle(page)
+        assert value(page, "bonds.critical_speed") == "10 mm/s"
+        assert "earlier numbers" in page.locator("#earlier").text_content()
+        assert page.locator(".track svg").count() == 0
+        page.locator("#undo").click()
+        page.locator("#use").click()
+        idle(page)
+        assert page.locator(".track svg").count() == 1
+        assert not page.locator("#earlier").is_visible()
+        # a reload keeps table, fit and what can be undone
+        page.reload()
+        settled(page)
+        idle(page)
+        assert page.locator(".track svg").count() == 1
+        assert "χ²" in page.locator("#judged").text_content()
+        page.locator("#undo").click()
+        idle(page)
+        assert page.locator(".track svg").count() == 0
+        assert value(page, "bonds.critical_speed") == "10 mm/s"
+
+
+def test_the_order_of_subtraction_is_in_the_sentence_with_both_its_ends(shown):
+    idle(shown)
+    words = lost(shown)
+    curves = shown.evaluate("explored.answers.curves.answer")
+    (at,) = curves["level"]["places"]
+    scene = sim.load(tomllib.loads(SCENE))
+    exact = steady(scene, np.array([at]))
+    for name, either in (
+        ("bonds", ("lost_to_bonds", "lost_to_bonds_last")),
+        ("fluctuations", ("lost_to_fluctuations", "lost_to_fluctuations_first")),
+    ):
+        ends = sorted(100.0 * float(exact[k][0]) for k in either)
+        assert f"{name} {ends[0]:.1f} to {ends[1]:.1f}" in words
+    shown.locator("#first").check()
+    idle(shown)
+    assert lost(shown) == words
+
+
+def test_the_flagship_of_stick_slip_opens_with_slips_that_go_on_under_a_new_number(
+    browser,
+):
+    with scenario(browser, "pdms_lens_spring") as page:
+        wait(page, lambda: lost(page).startswith("First member, 2 s"), "no motion")
+        forces = page.evaluate("explored.motion.columns.spring_force")
+        assert len(forces) == 2001 and max(forces) > 3.0 * min(forces)
+        first = sim.run(
+            sim.load(
+                "scenarios/pdms_lens_spring.toml", {"sweep": {}, "ensemble.members": 1}
+            )
+        )
+        assert_allclose(forces, first["spring_force"][..., :].squeeze(), rtol=1e-5)
+        assert page.locator("[id='drive.stage']").count()
+        wait(page, lambda: page.evaluate("explored.motion.time > 0.05"), "it stands")
+        words = page.locator("#ratio").text_content
+        wait(page, lambda: words().startswith("now 1 : "), "no ratio")
+        page.locator("#play").click()
+        time = page.evaluate("explored.motion.time")
+        enter(page, "8 mN", LOAD)
+        wait(page, lambda: "changed at" in lost(page), "the motion stays")
+        idle(page)
+        pieces = page.evaluate("explored.motion.pieces")
+        assert [piece["of"][LOAD] for piece in pieces] == [4e-3, 8e-3]
+        assert time <= pieces[1]["from"] <= time + 0.0201
+        after = page.evaluate("explored.motion.columns.spring_force")
+        cut = round(pieces[1]["from"] / 1e-3) + 1
+        assert after[:cut] == forces[:cut] and after[cut:] != forces[cut:]
+        assert page.locator("#plot [data-name=changed]").count()
+
+
+def test_a_slider_beyond_its_partner_is_undone_whole(browser):
+    key = "shear.spectrum.shortest"
+    with scenario(browser, "pdms_lens") as page:
+        idle(page)
+        before = value(page, key)
+        slider = page.locator(f"[id='{key}']")
+        slider.evaluate(
+            """(item) => { for (const place of [200, 290, 300]) {
+            item.value = place; item.dispatchEvent(new Event("input", { bubbles: true })); }
+            item.dispatchEvent(new Event("change", { bubbles: true })); }"""
+        )
+        wait(page, lambda: page.locator(ALERT).count() == 1, "not refused")
+        idle(page)
+        message = page.locator(ALERT).text_content()
+        assert "30 µm" in message and f"{value(page, key)} stays in use" in message
+        if page.locator("#undo").is_enabled():
+            page.locator("#undo").click()
+        idle(page)
+        assert value(page, key) == before
+        enter(page, "abc", key)
+        wait(page, lambda: "abc" in page.locator(ALERT).text_content(), "not refused")
+        described = page.locator(f"[id='text {key}']").get_attribute(
+            "aria-errormessage"
+        )
+        assert "abc" in page.locator(f"[id='{described}']").text_content()
+        page.locator("#reset").click()
+        idle(page)
+        assert value(page, key) == before and page.locator(ALERT).count() == 0
+
+
+def test_one_bad_number_of_an_address_is_named_and_left_out(browser, served):
+    with opened(browser, f"{served}&{RADIUS}=-1&contact.load=0.008") as page:
+        idle(page)
+        assert (value(page), value(page, LOAD)) == ("2 mm", "8 mN")
+        assert "above 0" in page.locator("#trouble").text_content()
+
+
+def test_a_saved_figure_is_the_one_that_is_seen(random):
+    drop(random, "speed [mm/s],contact_area [mm^2]\n1,0.04\n9,0.03", "own.csv")
+    run(random, 8)
+    random.locator("#absolute").check()
+    wait(random, lambda: "8 members" in random.locator("#ran").text_content(), "no run")
+    idle(random)
+    text = saved(random, "svg").read_text(encoding="utf-8")
+    for word in ("measured", "own models, mean of 8", "area A (mm²)", "<desc"):
+        assert word in text
+    drawn = random.locator("#plot [data-name=area]").get_attribute("d")
+    assert f'd="{drawn}"' in text
+
+
+def test_save_and_copy_are_played_by_keyboard(browser, served):
+    with opened(
+        browser, served, permissions=["clipboard-read", "clipboard-write"]
+    ) as page:
+        page.locator("#save summary").focus()
+        page.keyboard.press("Enter")
+        for _ in range(3):
+            page.keyboard.press("Tab")
+        with page.expect_download() as download:
+            page.keyboard.press("Enter")
+        assert download.value.suggested_filename == "explored.png"
+        page.locator("#save summary").focus()
+        page.keyboard.press("Enter")
+        page.keyboard.press("Escape")
+        assert page.evaluate("document.activeElement.textContent") == "Save"
+        enter(page, "3 mm")
+        wait(page, lambda: RADIUS in page.url, "not read")
+        page.locator("#copy summary").click()
+        page.get_by_text("link for this machine").click()
+        wait(page, lambda: page.locator("#copied").text_content(), "not copied")
+        link = page.evaluate("navigator.clipboard.readText()")
+        page.locator("#copy summary").click()
+        page.get_by_text("command", exact=True).click()
+        page.wait_for_timeout(200)
+        command = page.evaluate("navigator.clipboard.readText()")
+        assert command.startswith("sim explore ") and f"{RADIUS}=0.003" in command
+        with opened(browser, link) as other:
+            assert value(other) == "3 mm"
+        keyless = page.context.new_page()
+        keyless.goto(served.partition("#")[0])
+        wait(
+            keyless,
+            lambda: "lost its key" in keyless.locator("#trouble").text_content(),
+            "no word",
+        )
+        assert not keyless.locator("#main").is_visible()
+
+
+def test_a_bare_number_has_the_unit_that_is_shown_and_a_mechanism_a_switch(shown):
+    enter(shown, "5")
+    wait(shown, lambda: value(shown) == "5 mm", "not read")
+    enter(shown, "2,5")
+    wait(shown, lambda: value(shown) == "2.5 mm", "no decimal comma")
+    shown.get_by_label("fluctuations", exact=True).uncheck()
+    idle(shown)
+    assert shown.evaluate("explored.values['shear.paid_by_adhesion']") == 0
+    assert shown.locator("#plot [data-name=lost_to_fluctuations]").count() == 0
+    shown.keyboard.press("Control+z")
+    idle(shown)
+    assert shown.get_by_label("fluctuations", exact=True).is_checked()
+    shown.keyboard.press("Control+Shift+Z")
+    idle(shown)
+    assert not shown.get_by_label("fluctuations", exact=True).is_checked()
+
+
+def test_a_table_without_units_beyond_the_speeds_and_of_radii_is_drawn_and_said(shown):
+    drop(shown, "speed,contact_radius\n1,1.1e-4\n2,1e-4", "radii.csv")
+    wait(shown, lambda: "SI" in shown.locator("#judged").text_content(), "no remark")
+    idle(shown)
+    assert shown.locator("#plot [data-name=measured]").count() == 2
+    assert shown.evaluate("explored.answers.curves.answer.x.at(-1)") >= 2.0
+
+
+def test_curves_are_read_by_keyboard_and_as_a_table(shown):
+    idle(shown)
+    shown.locator("#at").focus()
+    shown.keyboard.press("ArrowRight")
+    reading = shown.locator("#reading")
+    wait(shown, lambda: "area" in reading.text_content(), "no reading")
+    place = int(shown.locator("#at").input_value())
+    curves = shown.evaluate("explored.answers.curves.answer.curves")
+    exact = 100.0 * curves["area_ratio"][place]
+    assert f"area, area (% of JKR's) {exact:.4g}" in reading.text_content()
+    assert reading.get_attribute("aria-live") == "polite"
+    assert shown.locator("#plot svg title").text_content()
+    shown.locator("#numbers summary").click()
+    wait(shown, lambda: shown.locator("#numbers tr").count() > 50, "no table")
+
+
+AXE = Path(sim.__file__).parents[1] / "node_modules" / "axe-core" / "axe.min.js"
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="make page installs axe-core")
+@pytest.mark.parametrize("name", ["pdms_lens", "pdms_lens_spring", "masking"])
+@pytest.mark.parametrize(
+    "looks", [{}, {"color_scheme": "dark"}, {"viewport": {"width": 390, "height": 800}}]
+)
+def test_axe_finds_no_violation(browser, name, looks):
+    with scenario(browser, name, **looks) as page:
+        idle(page)
+        page.locator("#numbers summary").click()
+        page.evaluate(AXE.read_text(encoding="utf-8"))
+        found = page.evaluate("axe.run().then(({ violations }) => violations)")
+        assert [
+            (one["id"], [node["html"][:200] for node in one["nodes"]]) for one in found
+        ] == []
+
+
+def test_reduced_motion_shows_pictures_at_steps(browser):
+    with scenario(browser, "stick_slip", reduced_motion="reduce") as page:
+        idle(page)
+        page.wait_for_timeout(300)
+        assert page.evaluate("explored.motion.time") == 0
+        page.locator("#step").click()
+        assert_allclose(page.evaluate("explored.motion.time"), 0.2, rtol=1e-9)
 
 
 def test_a_notebook_shows_pages_side_by_side_that_end_with_its_kernel(

@@ -38,7 +38,9 @@ export function scaled(magnitude, unit) {
 /** Return a number with four digits at most.
  * @param {number} value */
 export function digits(value) {
-  return String(Number(value.toPrecision(4)));
+  const size = Math.abs(value);
+  const isPlain = value === 0 || (size >= 1e-4 && size < 1e7);
+  return isPlain ? String(Number(value.toPrecision(4))) : String(Number(value.toPrecision(4)).toExponential());
 }
 
 /** Return a number in SI with the unit that suits it, such as "120.3 µm".

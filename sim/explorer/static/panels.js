@@ -336,7 +336,7 @@ export function tableOf(shown) {
   );
   const { x } = shown[0].marks.find(({ kind }) => kind === "line") ?? { x: [] };
   const same = lines.filter(({ mark }) => mark.x.length === x.length);
-  const every = Math.ceil(x.length / 100);
+  const every = Math.ceil(x.length / 200);
   const rows = x.map((at, k) => [
     at,
     ...same.map(({ mark }) => {

@@ -282,8 +282,8 @@ function job(state) {
   else if (!text && run) {
     const { members, along } = run.answer;
     const other = differences(state, run.of.values);
-    const name =
-      along === "t" ? "first member, below" : `${members} members: mean and 95 % interval in the figure over the speed`;
+    const many = members > 1 ? `${members} members: mean and 95 % interval` : "all members are equal: one of them";
+    const name = along === "t" ? "first member, below" : `${many} in the figure over the speed`;
     text = other ? `${name}; of earlier numbers: ${nameOfRun(state)}` : name;
   } else if (!text) text = current(state, "band")?.reason ?? "";
   if ($("ran").textContent !== text) $("ran").textContent = text;
