@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 import os
 import re
 import shutil
@@ -19,6 +20,8 @@ from helpers.commands import COUNTED, LENS, RAMP
 from numpy.testing import assert_allclose
 
 import sim
+from sim.explorer.page import Page
+from sim.scenario.schema import quantities
 from sim.study.curves import curves as steady
 
 playwright = pytest.importorskip("playwright.sync_api", reason="in the extra verify")
@@ -45,6 +48,8 @@ SCENE = (
 #: A scene whose ensembles take minutes.
 LONG = LENS.replace('duration = "1 s"', 'duration = "10000 s"') + RAMP + COUNTED
 RADIUS = "sphere.radius"
+#: Gestures of one random walk; there are ten walks.
+GESTURES = 200
 FILL = "(item) => getComputedStyle(item).fill"
 ALERT = "[role=alert]:not([hidden])"
 #: The inputs of a page that are seen; their names with widths and heights; its texts with their contrasts.
@@ -557,6 +562,7 @@ IDLE = """async () => {
     const { nextOfMotion } = await import("/state.js");
     const { values, answers } = explored;
     const plot = document.getElementById("plot").dataset;
+    if (document.querySelector("[aria-busy=true]")) return false;
     return due(explored).length === 0 && nextOfMotion(explored) === null && plot.of === JSON.stringify(values);
 }"""
 
@@ -863,6 +869,189 @@ def test_reduced_motion_shows_pictures_at_steps(browser):
         assert page.evaluate("explored.motion.time") == 0
         page.locator("#step").click()
         assert_allclose(page.evaluate("explored.motion.time"), 0.2, rtol=1e-9)
+
+
+#: Facts of a page: its state, and what its controls, its figure and its sentence show.
+FACTS = """async () => {
+    const { textOf, placeOf, words } = await import("/state.js");
+    const { ask } = await import("/connection.js");
+    const frame = () => new Promise(requestAnimationFrame);
+    let state = null;
+    while (state !== explored) { state = explored; await frame(); await frame(); }
+    const { start, values, view, run, fit, refusal, past, future, table } = state;
+    const at = (id) => document.getElementById(id);
+    const plot = at("plot");
+    const fields = start.sliders.filter((slider) => {
+        const [range, text] = [at(slider.key), at(`text ${slider.key}`)];
+        const shown = refusal?.key === slider.key && refusal.typed ? refusal.text : textOf(explored, slider);
+        const place = Math.min(300, Math.max(0, placeOf(slider, values[slider.key], 300)));
+        return text.value !== shown || Number(range.value) !== place
+            || (text.getAttribute("aria-invalid") === "true") !== (refusal?.key === slider.key);
+    }).map(({ key }) => [key, at(key).value, at(`text ${key}`).value, values[key], JSON.stringify(refusal)]);
+    const bars = document.querySelectorAll(".track svg").length;
+    const isOf = (one) => one && Object.keys(one).every((key) => one[key] === values[key]);
+    const facts = {
+        values, view, fields, bars, table, x: explored.answers.curves.answer.x,
+        // which is written at the end of a drag
+        address: explored.dragging || location.hash.slice(1) === new URLSearchParams(words(explored)).toString(),
+        drawn: JSON.parse(plot.dataset.of), share: Number(plot.dataset.share), lost: at("lost").textContent,
+        reading: at("at").getAttribute("aria-valuetext"), place: Number(at("at").value),
+        points: plot.querySelectorAll("[data-name=measured]").length,
+        judged: at("judged").hidden ? "" : at("judged").textContent,
+        stale: plot.querySelectorAll("[data-name=ran]").length,
+        ran: run !== null, isRunOf: Boolean(run && isOf(run.of.values)),
+        isFitOf: Boolean(fit && isOf({ ...fit.of.values, ...fit.values }) && fit.of.data === table),
+        fitted: fit ? Object.keys(fit.values).length : 0,
+        undo: !at("undo").disabled === past.length > 0, redo: !at("redo").disabled === future.length > 0,
+        boxes: ["absolute", "first", "loads"].every((name) => at(name).checked === view[name]),
+        level: Number(at("level").value) === Math.round(100 * view.share),
+        switches: [...document.querySelectorAll("#mechanisms input")].every(
+            (box) => box.checked === (values[box.value] !== 0)),
+    };
+    return { ...facts, toml: (await ask("toml", { values })).text };
+}"""
+#: Drags a slider over some places, without its end, or to its end.
+DRAG = """(item, [places, isEnd]) => {
+    item.dispatchEvent(new PointerEvent("pointerdown", { bubbles: true }));
+    for (const place of places) {
+        item.value = place;
+        item.dispatchEvent(new Event("input", { bubbles: true }));
+    }
+    if (isEnd) item.dispatchEvent(new Event("change", { bubbles: true }));
+}"""
+KEYS = (RADIUS, LOAD, "bonds.critical_speed", "adhesion.work", "contact.reversible")
+
+
+class Walk:
+    """A random walk over the gestures of a page; each is followed by a look at all that it shows."""
+
+    def __init__(self, page, path, seed):
+        self.page, self.pick = page, np.random.default_rng(seed)
+        self.model, self.path = Page(sim.load(path)), path
+        self.table, self.done = None, []
+
+    def gesture(self):
+        kinds = [name for name in dir(self) if name.startswith("go_")]
+        kinds += ["go_drag", "go_press", "go_text", "go_undo", "go_redo"] * 3
+        name = str(self.pick.choice(kinds))
+        self.done.append(name)
+        getattr(self, name)()
+
+    def key(self):
+        return str(self.pick.choice(KEYS))
+
+    def go_drag(self):
+        places = self.pick.integers(0, 301, 5).tolist()
+        slider = self.page.locator(f"[id='{self.key()}']")
+        slider.evaluate(DRAG, [places, bool(self.pick.random() < 0.8)])
+
+    def go_press(self):
+        self.page.locator(f"[id='{self.key()}']").focus()
+        for _ in range(self.pick.integers(1, 4)):
+            self.page.keyboard.press(
+                str(self.pick.choice(["ArrowLeft", "ArrowRight", "End"]))
+            )
+
+    def go_text(self):
+        texts = ["3 kg", "abc", "2", "3,5", "-1", "1e-3", "2 mm", "8 mN", "7 mm/s", ""]
+        enter(self.page, str(self.pick.choice(texts)), self.key())
+
+    def go_undo(self):
+        self.page.evaluate("document.getElementById('undo').click()")
+
+    def go_redo(self):
+        self.page.keyboard.press("Control+y")
+
+    def go_reset(self):
+        self.page.evaluate("document.getElementById('reset').click()")
+
+    def go_view(self):
+        name = str(self.pick.choice(["absolute", "first", "loads"]))
+        self.page.locator(f"#{name}").click()
+
+    def go_level(self):
+        place = int(self.pick.integers(1, 96))
+        self.page.locator("#level").evaluate(DRAG, [[place], True])
+
+    def go_switch(self):
+        boxes = self.page.locator("#mechanisms input")
+        boxes.nth(int(self.pick.integers(0, boxes.count()))).click()
+
+    def go_run(self):
+        run(self.page, int(self.pick.integers(2, 5)))
+
+    def go_stop(self):
+        self.page.evaluate("document.getElementById('stop').click()")
+
+    def go_table(self):
+        drop(self.page, points(self.path, [1e-3, 3e-3, 1e-2]), "own.csv")
+
+    def go_fit(self):
+        box = self.page.locator("#free input[value='bonds.critical_speed']")
+        if box.is_visible():
+            box.check()
+            self.page.evaluate("document.getElementById('fit').click()")
+
+    def go_use(self):
+        if self.page.locator("#use").is_visible():
+            self.page.locator("#use").click()
+
+    def go_link(self):
+        word = str(self.pick.choice(["0.003", "0.001", "abc", "-1"]))
+        self.page.evaluate(f"location.hash = '{self.key()}={word}&share=0.2'")
+
+    def go_reload(self):
+        self.page.reload()
+        settled(self.page)
+
+    def look(self):
+        """Assert that fields, state, saved scenario, figure and sentence are of the same numbers."""
+        idle(self.page)
+        facts = self.page.evaluate(FACTS)
+        values, share = facts["values"], facts["view"]["share"]
+        assert facts["fields"] == []
+        assert facts["drawn"] == values and facts["share"] == share
+        for name in ("address", "undo", "redo", "boxes", "level", "switches"):
+            assert facts[name], name
+        known = quantities(sim.load(tomllib.loads(facts["toml"])))
+        for key, number in values.items():
+            assert_allclose(known[key][1], number, rtol=1e-12, err_msg=key)
+        columns = steady(self.model.read(values), np.array(facts["x"]))
+        name = "contact_area" if facts["view"]["absolute"] else "area_ratio"
+        exact = float(columns[name][facts["place"]])
+        shown = re.search(r"; area, area (?:A )?\(([^)]*)\) ([^;]+)", facts["reading"])
+        factor = {"% of JKR's": 100.0, "mm²": 1e6, "µm²": 1e12}[shown[1]]
+        if math.isfinite(exact):
+            assert_allclose(
+                float(shown[2].replace("−", "-")), factor * exact, rtol=1e-3
+            )
+        # a table may have widened the axis
+        if facts["x"][-1] < 1.1 * self.model.speeds[-1]:
+            words = self.model.answer(values, share)["level"]["words"]
+            assert facts["lost"] == words
+        has_table = facts["table"] is not None
+        assert has_table == ("χ²" in facts["judged"])
+        # an open contact has no share of JKR's area
+        assert (facts["points"] > 0) == (has_table and math.isfinite(exact))
+        assert (facts["stale"] > 0) == (facts["ran"] and not facts["isRunOf"])
+        assert facts["bars"] == (facts["fitted"] if facts["isFitOf"] else 0)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_after_any_gesture_all_that_is_shown_belongs_to_the_same_numbers(
+    browser, tmp_path, seed
+):
+    path = tmp_path / "random.toml"
+    path.write_text(LENS + RAMP + COUNTED + WAVES, encoding="utf-8")
+    with explored(path) as (_, address), opened(browser, address) as page:
+        walk = Walk(page, path, seed)
+        for _ in range(GESTURES):
+            walk.gesture()
+            try:
+                walk.look()
+            except AssertionError as fault:
+                raise AssertionError(f"after {walk.done[-6:]}: {fault}") from fault
+        assert page.said == []
 
 
 def test_a_notebook_shows_pages_side_by_side_that_end_with_its_kernel(

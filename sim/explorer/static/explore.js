@@ -167,13 +167,17 @@ const sliderOf = (key) =>
  * @param {string} text */
 async function read(key, text) {
   const began = epoch;
+  const field = $(`text ${key}`);
   const shown = change.textOf(state, sliderOf(key)).split(" ").slice(1).join(" ");
   const isBare = /^[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?$/i.test(text.trim());
   const unit = shown.replaceAll("µ", "u").replaceAll("²", "^2").replaceAll("³", "^3");
   const words = isBare ? `${text.trim().replace(",", ".")} ${unit}`.trim() : text;
+  field.setAttribute("aria-busy", "true");
   try {
     const found = await ask("curves", { values: { ...state.values, [key]: words } });
-    if (epoch !== began) return;
+    // the field follows the state again, unless more was written meanwhile
+    if (field.value === text) field.dataset.shown = text;
+    if (epoch !== began) return update({ ...state });
     if (found.faults) {
       const reason = found.faults[key] ?? Object.values(found.faults).join("; ");
       return update(change.refused(state, key, text, reason));
@@ -184,6 +188,8 @@ async function read(key, text) {
     else update({ ...state, refusal: null });
   } catch (fault) {
     complain(fault);
+  } finally {
+    field.removeAttribute("aria-busy");
   }
 }
 
