@@ -324,6 +324,98 @@ def test_a_band_that_takes_too_long_is_not_begun(lens):
     assert short.band({})["along"] == "speed" and "too long" in long.band({})["reason"]
 
 
+def test_a_band_that_was_slow_once_is_tried_again(lens, monkeypatch):
+    page, now = Page(sim.load(lens)), [100.0]
+    monkeypatch.setattr("sim.explorer.page.time.monotonic", lambda: now[0])
+    assert page.band({})["along"] == page.band({})["along"] == "speed"
+    page._time = 1.0
+    assert "reason" in page.band({})
+    now[0] += 6.0
+    assert page.band({})["along"] == page.band({})["along"] == "speed"
+
+
+def test_the_sentence_says_so_if_a_share_is_lost_everywhere_or_the_contact_is_open(
+    lens,
+):
+    page = Page(sim.load(lens))
+
+    def words(values, share=0.1):
+        return page.answer(values, share)["level"]["words"]
+
+    masked = {"shear.spectrum.rms": 1e7}
+    lost = 100.0 * (1.0 - curves(page.read(masked), page.speeds)["area_ratio"])
+    assert words(masked) == (
+        f"10 % or more of the area is lost at every speed shown: {lost.min():.3g} to {lost.max():.3g} %"
+    )
+    assert "open everywhere" in words({"contact.load": -0.1})
+    alone = {"shear.paid_by_adhesion": 0.0, "adhesion.bond_share": 0.0}
+    assert words(alone) == "No area is lost at any speed shown"
+    most = 100.0 * (1.0 - np.nanmin(curves(page.scenario, page.speeds)["area_ratio"]))
+    assert f"at most {most:.3g} %" in words({}, 0.9)
+
+
+def test_marks_rank_numbers_by_the_drawn_share_of_the_area():
+    page = Page(sim.load("scenarios/pdms_lens.toml"))
+    before, effects = curves(page.scenario, page.speeds)["area_ratio"], {}
+    for slider in page.sliders:
+        size = 0.1 * (slider.value or 1.0)
+        other = slider.value + size * (1 if slider.value == 0.0 else -1)
+        after = curves(page.read({slider.key: other}), page.speeds)["area_ratio"]
+        effects[slider.key] = float(np.max(np.abs(after - before)))
+    marked = {slider.key for slider in page.sliders if slider.marked}
+    assert "shear.spectrum.rms" in marked and "sphere.radius" not in marked
+    assert min(effects[key] for key in marked) > effects["sphere.radius"]
+
+
+def test_a_figure_over_a_sweep_has_the_curves_of_its_points():
+    page = Page(sim.load("scenarios/masking.toml"))
+    assert page.figures == ["sweep", "speed"]
+    answer = page.answer({}, 0.1, "sweep")
+    assert len(answer["x"]) == 41 and answer["axis"]["unit"][1] == "kPa"
+    for place in (0, 20, 40):
+        at = {"shear.spectrum.amplitude": answer["x"][place]}
+        exact = curves(page.read(at), np.array([3e-3]))["area_ratio"][0]
+        assert_allclose(answer["curves"]["area_ratio"][place], exact, rtol=1e-12)
+    # 10 % is between the two neighbours that the sentence names
+    ratio = np.array(answer["curves"]["area_ratio"])
+    first = int(np.flatnonzero(ratio <= 0.9)[0])
+    low, high = (1e-3 * answer["x"][k] for k in (first - 1, first))
+    assert f"between {low:.4g} kPa and {high:.4g} kPa" in answer["level"]["words"]
+
+
+@pytest.mark.parametrize(
+    ("name", "figure"),
+    [("stick_slip", "motion"), ("pull_off", "motion"), ("pdms_lens", "speed")],
+)
+def test_a_page_opens_with_the_figure_of_what_its_scenario_computes(name, figure):
+    page = Page(sim.load(f"scenarios/{name}.toml"))
+    start = page.start()
+    assert start["figures"][0] == figure and start["question"].endswith("?")
+
+
+def test_other_curves_are_those_of_the_other_points_of_a_sweep_and_of_other_loads():
+    page = Page(sim.load("scenarios/temperature.toml"))
+    assert len(page.others({})["others"]) == 4
+    load = page.scenario.contact.load
+    *_, last = page.others({}, loads=True)["others"]
+    exact = curves(page.read({"contact.load": 4.0 * load}), page.speeds)
+    assert_allclose(last["curves"]["contact_area"], exact["contact_area"], rtol=1e-12)
+    assert last["label"].startswith("P = ")
+
+
+def test_a_table_without_units_says_so_and_one_of_radii_has_points(lens):
+    page = Page(sim.load(lens))
+    text = "speed,contact_radius,contact_radius_error\n1,1.1e-4,1e-6\n2,1e-4,1e-6\n"
+    answer = page.answer({}, 0.1, table=page.add(text, "radii.csv"))
+    assert "SI" in answer["data"]["remark"]
+    points = answer["data"]["points"]["contact_area"]
+    assert_allclose(points["values"], np.pi * np.array([1.1e-4, 1e-4]) ** 2, rtol=1e-12)
+    assert_allclose(
+        points["errors"], 2e-6 * np.pi * np.array([1.1e-4, 1e-4]), rtol=1e-12
+    )
+    assert answer["x"][-1] >= 2.0
+
+
 @pytest.mark.parametrize(
     "link",
     [

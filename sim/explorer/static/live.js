@@ -178,7 +178,7 @@ function above(motion, theme, size, map) {
     const passed = (((at(motion, "slider_position") ?? 0) * scale) % side) - side;
     const energy = at(motion, "fluctuation_energy") ?? 0;
     const opacity = Math.min(1, Math.sqrt(Math.max(0, energy) / map.energy));
-    const look = { y: y - side / 2, width: side, height: side, href: map.href, preserveAspectRatio: "none" };
+    const look = { y: y - side / 2, width: side + 0.5, height: side, href: map.href, preserveAspectRatio: "none" };
     const images = [0, 1, 2].map((k) => h("image", { ...look, x: (10 - passed + (k - 2) * side).toFixed(2) }));
     parts.push(h("rect", { x: 10, y: 5, width: size, height: size, fill: "#ffffff" }));
     parts.push(h("g", { "clip-path": "url(#above)", opacity: opacity.toFixed(3) }, ...images));

@@ -200,7 +200,7 @@ function ofRun(state, name, factor, axis) {
   const isStale = state.run && differences(state, state.run.of.values) !== "";
   const band = current(state, "band");
   const runs = [
-    ...(state.run && !isStale ? [] : band ? [[band, "mean of a few members"]] : []),
+    ...(state.run && !isStale ? [] : band ? [[band, `mean of ${band.members}`]] : []),
     ...(state.run ? [[state.run.answer, nameOfRun(state)]] : []),
   ];
   return runs

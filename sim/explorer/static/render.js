@@ -385,29 +385,41 @@ function readAt(state, shown, table) {
   return { kind: "rule", x: [row[0]], y: [], colour: COLOURS.own, width: 1, dash: "2 3", name: "reading" };
 }
 
-/** @type {WeakMap<object, { href: string, side: number, most: number }>} */
+/** Pictures of maps, by the answer with the mean stress, and by its map without it.
+ * @type {WeakMap<object, { href: string, side: number, most: number }>} */
 const maps = new WeakMap();
 
-/** Return a map of the stress as a picture.
- * @param {any} found */
-function mapOf(found) {
-  const known = maps.get(found);
+/** Return a map of the stress as a picture, in which white is a given stress.
+ * @param {any} found
+ * @param {number} middle */
+function mapOf(found, middle) {
+  const known = maps.get(middle ? found.stress : found);
   if (known) return known;
-  const size = found.stress.length;
-  const most = Math.max(...found.stress.flat().map(Math.abs)) || 1;
+  const stress = found.stress.map((/** @type {number[]} */ row) => row.map((value) => value - middle));
+  const size = stress.length;
+  const most = Math.max(...stress.flat().map(Math.abs)) || 1;
   const canvas = element("canvas", "", { width: size, height: size });
   const pen = canvas.getContext("2d");
   const image = pen.createImageData(size, size);
   // rows of the map run along the sliding direction, rows of the picture from above to below
   for (let x = 0; x < size; x += 1) {
     for (let y = 0; y < size; y += 1) {
-      image.data.set([...diverging(found.stress[x][y] / most), 255], 4 * ((size - 1 - y) * size + x));
+      image.data.set([...diverging(stress[x][y] / most), 255], 4 * ((size - 1 - y) * size + x));
     }
   }
   pen.putImageData(image, 0, 0);
   const result = { href: canvas.toDataURL(), side: found.side, most };
-  maps.set(found, result);
+  maps.set(middle ? found.stress : found, result);
   return result;
+}
+
+/** Return the map of the fluctuations alone, with their energy, for the picture of the motion.
+ * @param {any} found */
+function waves(found) {
+  if (!found?.stress || !(found.fluctuation_energy > 0)) return null;
+  const all = found.stress.flat();
+  const mean = all.reduce((/** @type {number} */ sum, /** @type {number} */ value) => sum + value, 0) / all.length;
+  return { ...mapOf(found, mean), energy: found.fluctuation_energy };
 }
 
 /** Draw the moment of the motion.
@@ -416,11 +428,8 @@ function mapOf(found) {
 export function now(state, { isDark }) {
   const look = theme(isDark);
   const { motion } = state;
-  const found = current(state, "contact");
-  const map =
-    found?.stress && found.fluctuation_energy > 0 ? { ...mapOf(found), energy: found.fluctuation_energy } : null;
   const width = Math.max(300, $("live").clientWidth);
-  $("scene-live").replaceChildren(built(picture(state, look, width, map)));
+  $("scene-live").replaceChildren(built(picture(state, look, width, waves(current(state, "contact")))));
   $("moment").textContent = reading(state) + (motion.note ? ` · ${motion.note}` : "");
   const ended = hasEnded(motion, state.start);
   $("play").textContent = ended ? "Play again" : motion.paused ? "Play" : "Pause";
@@ -479,7 +488,7 @@ function contact(state, { isDark }) {
   $("scene").classList.toggle("earlier", !found);
   if (!found) return;
   const { radius, speed } = found;
-  const map = found.stress ? mapOf(found) : null;
+  const map = found.stress ? mapOf(found, 0) : null;
   const colours = map
     ? `; blue is −${engineering(map.most, "Pa")} and red +${engineering(map.most, "Pa")} of one realisation of the shear stress`
     : "";
