@@ -878,6 +878,7 @@ FACTS = """async () => {
     const frame = () => new Promise(requestAnimationFrame);
     let state = null;
     while (state !== explored) { state = explored; await frame(); await frame(); }
+    if (!await (IDLE)()) return null; // a job has just ended
     const { start, values, view, run, fit, refusal, past, future, table } = state;
     const at = (id) => document.getElementById(id);
     const plot = at("plot");
@@ -1007,7 +1008,9 @@ class Walk:
     def look(self):
         """Assert that fields, state, saved scenario, figure and sentence are of the same numbers."""
         idle(self.page)
-        facts = self.page.evaluate(FACTS)
+        facts = None
+        while facts is None:
+            facts = self.page.evaluate(FACTS.replace("IDLE", IDLE))
         values, share = facts["values"], facts["view"]["share"]
         assert facts["fields"] == []
         assert facts["drawn"] == values and facts["share"] == share
@@ -1020,7 +1023,7 @@ class Walk:
         name = "contact_area" if facts["view"]["absolute"] else "area_ratio"
         exact = float(columns[name][facts["place"]])
         shown = re.search(r"; area, area (?:A )?\(([^)]*)\) ([^;]+)", facts["reading"])
-        factor = {"% of JKR's": 100.0, "mm²": 1e6, "µm²": 1e12}[shown[1]]
+        factor = {"% of JKR's": 100.0, "m²": 1.0, "mm²": 1e6, "µm²": 1e12}[shown[1]]
         if math.isfinite(exact):
             assert_allclose(
                 float(shown[2].replace("−", "-")), factor * exact, rtol=1e-3

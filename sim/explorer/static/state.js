@@ -216,7 +216,8 @@ export function answered(state, slot, of, answer) {
   const next = { ...state, answers: { ...state.answers, [slot]: { of, answer } } };
   if (slot !== "curves") return next;
   if (!answer.faults) return { ...next, accepted: of.values };
-  if (!same(of.values, state.values)) return state;
+  // the refusal of other numbers says nothing, but what is asked now may be asked again
+  if (!same(of.values, state.values)) return { ...state };
   const { accepted, start, touched } = state;
   const reasons = Object.values(answer.faults).join("; ");
   if (!accepted) {
