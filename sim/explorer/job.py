@@ -16,12 +16,12 @@ from sim.ensemble.execute import end_with
 from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
 from sim.explorer.drawing import listed
-from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
+from sim.units.notation import engineering
 from sim.units.terminal import duration
 
-#: Most points of a band that are drawn, and intervals of a trace of which least and largest values are.
+#: Most points of a band that are drawn.
 _DRAWN = 1000
 #: Quantities that are drawn.
 _NAMES = ("contact_area", "friction_force")
@@ -79,41 +79,35 @@ def fitted(scenario: Scenario, table: Any, free: list[str], say: Say) -> dict[st
 
 
 def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
-    """Return area and friction of a run as they are drawn [SI]: means with their 95 % intervals, or a trace.
+    """Return what is shown of a run [SI]: means over members with their 95 % intervals.
 
-    Under a spring or a force it is the trace of the first member over time. If the speed changes, the means are over
-    members at each time; else they are over members and the second half of the run, a single point.
+    Of a motion they are, in words, the means of each member's largest friction and smallest area. If the speed changes,
+    they are area and friction at each time; else those of the second half of the run, a single point.
     """
-    from scipy.stats import t as student
-
     (data,) = xr.broadcast(dataset[[*_NAMES, "jkr_radius", "speed"]])
     data = data if "member" in data.dims else data.expand_dims("member")
     data["area_ratio"] = data["contact_area"] / (
         np.pi * data["jkr_radius"].where(data["jkr_radius"] > 0.0) ** 2
     )
-    data, speed, members = (
-        data.drop_vars(["jkr_radius", "speed"]),
-        dataset["speed"],
-        data.sizes["member"],
-    )
+    data, speed = data.drop_vars(["jkr_radius", "speed"]), dataset["speed"]
+    members = data.sizes["member"]
     if scene.drive.solves_motion or scene.contact.changes:
-        first = data.isel(member=0)
-        first = first.isel(t=_extremes([first[name].to_numpy() for name in _NAMES]))
-        curves = {str(name): {"mean": listed(values)} for name, values in first.items()}
-        return {"along": "t", "t": listed(first["t"]), "curves": curves, "members": 1}
+        words = [
+            f"{name} {engineering(float(mean), unit)} ± {engineering(float(half), unit)}"
+            for name, values, unit in (
+                ("largest friction", data["friction_force"].max("t"), "N"),
+                ("smallest area", data["contact_area"].min("t"), "m^2"),
+            )
+            for mean, half in [_interval(values)]
+        ]
+        return {"along": "t", "members": members, "words": ", ".join(words)}
     if float(np.ptp(speed.to_numpy())) == 0.0:
         data = data.isel(t=slice(data.sizes["t"] // 2, None)).mean("t").expand_dims("t")
         speed = speed.isel(t=slice(-1, None))
     every = slice(None, None, -(-data.sizes["t"] // _DRAWN))
     data, speed = data.isel(t=every), speed.isel(t=every)
-    mean, spread = data.mean("member"), xr.zeros_like(data.mean("member"))
-    if members > 1:
-        spread = (
-            data.std("member", ddof=1)
-            * float(student.ppf(0.975, members - 1))
-            / members**0.5
-        )
-    sides = {"mean": mean, "low": mean - spread, "high": mean + spread}
+    mean, half = _interval(data)
+    sides = {"mean": mean, "low": mean - half, "high": mean + half}
     curves = {
         str(name): {kind: listed(values[name]) for kind, values in sides.items()}
         for name in mean
@@ -126,16 +120,15 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _extremes(traces: list[Array]) -> Array:
-    """Return the places of the least and the largest value of each trace in each of many intervals, and both ends."""
-    size = len(traces[0])
-    places = {0, size - 1}
-    for part in np.array_split(np.arange(size), min(size, _DRAWN)):
-        for trace in traces:
-            known = part[np.isfinite(trace[part])]
-            if known.size:
-                places |= {known[trace[known].argmin()], known[trace[known].argmax()]}
-    return np.array(sorted(places))
+def _interval(data: Any) -> tuple[Any, Any]:
+    """Return means over members, and half the width of their 95 % intervals; 0 for a single member."""
+    from scipy.stats import t as student
+
+    mean, members = data.mean("member"), data.sizes["member"]
+    if members == 1:
+        return mean, xr.zeros_like(mean)
+    quantile = float(student.ppf(0.975, members - 1))
+    return mean, data.std("member", ddof=1) * quantile / members**0.5
 
 
 def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:

@@ -293,6 +293,8 @@ class Page:
 
     def band(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the band of a few members of the scenario's own models; empty if that takes too long to follow."""
+        if self.figures[0] == "motion":  # shows the first member itself
+            return {"reason": ""}
         from sim.explorer.job import ensemble
 
         scenes = self.scenes(values, min(_FEW, self.scenario.ensemble.members))

@@ -180,7 +180,11 @@ def test_a_page_asks_for_nothing_beyond_its_server_and_shows_a_hostile_name_as_t
         and shown.locator("#plot svg a").count() == 0
     )
     shown.locator("#run").click()
-    wait(shown, lambda: "mean" in shown.locator("#ran").text_content(), "no ensemble")
+    wait(
+        shown,
+        lambda: "members are equal" in shown.locator("#ran").text_content(),
+        "no ensemble",
+    )
     assert {
         re.match(r"(blob:)?http://127\.0\.0\.1:\d+/", url) is not None
         for url in shown.asked
@@ -329,7 +333,11 @@ def test_every_text_has_contrast(browser, served, scheme):
         wait(page, lambda: page.locator("#free input").count() > 5, "no points")
         enter(page, "3 kg")
         page.locator("#run").click()
-        wait(page, lambda: "mean" in page.locator("#ran").text_content(), "no ensemble")
+        wait(
+            page,
+            lambda: "members are equal" in page.locator("#ran").text_content(),
+            "no ensemble",
+        )
         wait(page, lambda: page.locator(ALERT).count() == 1, "no message")
         texts = page.evaluate(CONTRAST)
         assert len(texts) > 100 and {"Numbers", "measured", "3 kg", "Undo"} <= {
@@ -800,6 +808,37 @@ def test_save_and_copy_are_played_by_keyboard(browser, served):
             "no word",
         )
         assert not keyless.locator("#main").is_visible()
+
+
+def test_a_text_that_is_being_written_stays_while_the_page_is_drawn(shown):
+    idle(shown)
+    field = shown.locator(f"[id='text {RADIUS}']")
+    for text in ("3", "3 kg", "4"):  # a refusal does not stand in the way of the next
+        field.fill(text)
+        for _ in range(2):
+            shown.evaluate("dispatchEvent(new Event('resize'))")
+        assert field.input_value() == text
+        field.press("Enter")
+        idle(shown)
+    assert field.input_value() == "4 mm"
+
+
+def test_a_pinned_state_stays_beside_the_present_one_with_what_differs(shown):
+    idle(shown)
+    words = lost(shown)
+    drawn = shown.locator("#plot [data-name=area]").get_attribute("d")
+    shown.locator("#pin").click()
+    enter(shown, "8 mN", LOAD)
+    wait(shown, lambda: lost(shown) != words, "not read")
+    idle(shown)
+    assert shown.locator("#pinned").text_content() == f"Pinned at P = 4 mN: {words}"
+    # shares of the area have one axis, so that the pinned curve is where it was
+    pinned = shown.locator("#plot [data-name=pinned]").first.get_attribute("d")
+    assert pinned == drawn != shown.locator("#plot [data-name=area]").get_attribute("d")
+    shown.locator("#pin").click()
+    idle(shown)
+    assert not shown.locator("#pinned").is_visible()
+    assert shown.locator("#plot [data-name=pinned]").count() == 0
 
 
 def test_a_bare_number_has_the_unit_that_is_shown_and_a_mechanism_a_switch(shown):

@@ -152,8 +152,8 @@ const hash = () => new URLSearchParams(location.hash.slice(1));
 
 addEventListener("pagehide", () => {
   if (!state) return;
-  const { table, run, fit, past, future } = state;
-  store({ table, run, fit, past, future });
+  const { table, run, fit, pin, past, future } = state;
+  store({ table, run, fit, pin, past, future });
 });
 
 // Sliders
@@ -252,6 +252,7 @@ addEventListener("keydown", (event) => {
 
 // The figure
 
+on("pin", "click", () => update(change.pinned(state)));
 on("at", "input", () => update({ ...state, reading: Number($("at").value) }));
 on("numbers", "toggle", () => update({ ...state }));
 on("play", "click", () => {

@@ -72,22 +72,26 @@ function ofCurves(state, theme, narrow) {
     colour: theme.ink,
     ...more,
   });
-  const before = isCurrent(state, "before") ? state.answers.before.answer : null;
-  const dotted = { from: before, colour: COLOURS.rest, dash: "1 4", width: 2 };
+  const { pin } = state;
+  const figure = state.answers.curves.of.figure;
+  const isPinned = pin?.of.figure === figure;
+  const before = isPinned ? pin?.answer : isCurrent(state, "before") ? state.answers.before.answer : null;
+  const name = isPinned ? "pinned" : "as it came";
+  const dotted = { from: before, colour: COLOURS.rest, dash: "1 4", width: 2, name };
   const hasChanged = before && !same(before.values, shown.values);
   /** @type {(name: string) => Mark[]} */
-  const beside = (name) => [
-    ...(hasChanged ? [line(name, { ...dotted, label: name === sized ? "as it came" : "" })] : []),
+  const beside = (quantity) => [
+    ...(hasChanged ? [line(quantity, { ...dotted, label: quantity === sized ? name : "" })] : []),
     ...(current(state, "others")?.others ?? []).map((/** @type {any} */ other) =>
-      line(name, {
+      line(quantity, {
         from: { x: state.answers.others.answer.x, ...other },
         colour: COLOURS.rest,
         width: 1.2,
         label: greek(other.label),
       }),
     ),
-    ...ofRun(state, name, unitOf(name)[0], axis),
-    ...ofData(data, name, unitOf(name)[0], perX, theme),
+    ...ofRun(state, quantity, unitOf(quantity)[0], axis),
+    ...ofData(data, quantity, unitOf(quantity)[0], perX, theme),
   ];
   const areas = stacked(state, shown, theme, line);
   const [, unit] = unitOf(sized);

@@ -183,9 +183,7 @@ function follow(state, slider) {
   range.setAttribute("aria-valuetext", words);
   const refusal = state.refusal?.key === key ? state.refusal : null;
   const isTyped = document.activeElement === text && text.value !== text.dataset.shown;
-  if (refusal?.typed) text.value = refusal.text;
-  else if (!isTyped || state.gesture || text.getAttribute("aria-invalid") === "true") text.value = words;
-  text.dataset.shown = text.value;
+  if (!isTyped) text.value = text.dataset.shown = refusal?.typed ? refusal.text : words;
   text.setAttribute("aria-invalid", String(Boolean(refusal)));
   if (refusal) text.setAttribute("aria-errormessage", `fault ${key}`);
   else text.removeAttribute("aria-errormessage");
@@ -234,6 +232,11 @@ function words(state) {
     view.figure === "motion" ? motion.pieces.at(-1)?.of : state.answers.curves?.of.values,
   );
   const found = state.answers.words;
+  const { pin } = state;
+  const at = pin ? differences(state, pin.of.values) : "";
+  say("pinned", pin ? `Pinned${at ? ` at ${at}` : " here"}: ${pin.answer.level.words}` : "");
+  $("pin").textContent = pin ? "Unpin" : "Pin";
+  $("pin").setAttribute("aria-pressed", String(Boolean(pin)));
   for (const id of ["diagnosis", "remarks"]) {
     const lines = found?.answer[id] ?? [];
     const old = [...$(id).children].map((item) => item.textContent);
@@ -283,7 +286,8 @@ function job(state) {
     const { members, along } = run.answer;
     const other = differences(state, run.of.values);
     const many = members > 1 ? `${members} members: mean and 95 % interval` : "all members are equal: one of them";
-    const name = along === "t" ? "first member, below" : `${many} in the figure over the speed`;
+    const mean = members > 1 ? `mean of ${members} members with its 95 % interval` : "all members are equal";
+    const name = along === "t" ? `${mean}: ${run.answer.words}` : `${many} in the figure over the speed`;
     text = other ? `${name}; of earlier numbers: ${nameOfRun(state)}` : name;
   } else if (!text) text = current(state, "band")?.reason ?? "";
   if ($("ran").textContent !== text) $("ran").textContent = text;

@@ -23,7 +23,7 @@ import { engineering } from "./notation.js";
  *   dragging: boolean, touched: string, accepted: Values | null,
  *   refusal: { key: string, text: string, reason: string, typed: boolean } | null,
  *   table: string | null, answers: Record<string, Answer>, job: { task: string, done: number, left: string } | null,
- *   report: string, run: Answer | null, fit: (Answer & { values: Values }) | null, motion: Motion, reading: number | null,
+ *   report: string, run: Answer | null, pin: Answer | null, fit: (Answer & { values: Values }) | null, motion: Motion, reading: number | null,
  *   wavelength: boolean, trouble: string }} State */
 
 /** Numbers of the view that an address may hold beside those of sliders. */
@@ -66,6 +66,7 @@ export function initial(start) {
     job: null,
     report: "",
     run: null,
+    pin: null,
     fit: null,
     motion: still(start),
     reading: null,
@@ -258,6 +259,14 @@ export function finished(state, of, result) {
   const withResult = { ...next, fit: { of, answer: result, values } };
   const isAsked = same(of.values, state.values) && of.data === state.table;
   return isAsked ? withFit(withResult) : withResult;
+}
+
+/** Return the state in which its present curves are pinned for comparison, or none if they were.
+ * @param {State} state
+ * @returns {State} */
+export function pinned(state) {
+  const { curves } = state.answers;
+  return { ...state, pin: state.pin || !curves || curves.answer.faults ? null : curves };
 }
 
 /** Return the state with a table of measured curves.
