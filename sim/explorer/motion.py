@@ -8,6 +8,7 @@ import numpy as np
 
 from sim.ensemble.variables import READ
 from sim.explorer.drawing import listed
+from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.step.state import MemberNoise, State, pack
 
@@ -80,12 +81,15 @@ class Motions:
             )
             motion.states[last], step = state, last
             courses.append(course)
-        names = _names(scene)
-        columns = {
-            name: [x for course in courses for x in _column(scene, course, name)]
-            for name in names
-        }
-        columns["t"] = [x for course in courses for x in _rounded(course.time[:, 0])]
+        columns = {"t": [x for course in courses for x in _rounded(course.time)]}
+        for name in _names(scene):
+            columns[name] = [
+                x
+                for course in courses
+                for x in _rounded(
+                    np.broadcast_to(READ[name](scene, course), course.time.shape)
+                )
+            ]
         return {
             "run": run,
             "first": first,
@@ -105,14 +109,9 @@ def _names(scene: Scenario) -> list[str]:
     return names
 
 
-def _column(scene: Scenario, course: Any, name: str) -> list[float | None]:
-    values = np.broadcast_to(READ[name](scene, course), (len(course.time), 1))
-    return _rounded(values[:, 0])
-
-
-def _rounded(values: Any) -> list[float | None]:
+def _rounded(values: Array) -> list[float | None]:
     """Return numbers of few digits as JSON has them."""
     return [
         None if value is None else float(f"{value:.{_DIGITS}g}")
-        for value in listed(values)
+        for value in listed(np.ravel(values))
     ]

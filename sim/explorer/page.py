@@ -112,7 +112,7 @@ class Page:
         self.axis = _axis(scenario)
         self.sliders = list(self._sliders())
         self.motions = Motions()
-        self._time, self._measured = 0.0, -math.inf
+        self._slow_until, self._has_run = 0.0, False
         self._first = None if data is None else self.add(data, str(data))
 
     @property
@@ -302,15 +302,15 @@ class Page:
             scene.clock.steps * seconds_a_step(scene, scene.ensemble.members)
             for scene in scenes
         )
-        # the first run also loads and compiles, and the estimate is rough
-        is_recent = time.monotonic() - self._measured < _PAUSE
-        if estimate > 10.0 * _QUICK or (is_recent and self._time > _QUICK):
+        if estimate > 10.0 * _QUICK or time.monotonic() < self._slow_until:
             return {"reason": "eight members take too long to follow the sliders"}
-        began = time.perf_counter()
+        began = time.monotonic()
         result = ensemble(scenes, lambda message: None)
-        elapsed = time.perf_counter() - began
-        self._time = 0.0 if self._measured == -math.inf else elapsed
-        self._measured = time.monotonic()
+        now = time.monotonic()
+        # the first run also loads and compiles, and the estimate is rough
+        if self._has_run and now - began > _QUICK:
+            self._slow_until = now + _PAUSE
+        self._has_run = True
         return result
 
     def scenes(self, values: Mapping[str, Any], members: int) -> list[Scenario]:
@@ -540,10 +540,8 @@ def _loss(
         return f"Less than {limit:.3g} % of the area is lost at every {place} shown: at most {most:.3g} %"
     if swept is not None:
         first = int(np.flatnonzero(np.diff(lost >= limit))[0])
-        ends = [
-            engineering(float(end), _unit(scenario, swept))
-            for end in x[first : first + 2]
-        ]
+        unit = quantities(scenario)[swept][0].unit
+        ends = [engineering(float(end), unit) for end in x[first : first + 2]]
         return f"{limit:.3g} % of the area is lost between {ends[0]} and {ends[1]}"
     at = {
         name: column[0]
@@ -561,7 +559,3 @@ def _loss(
     others = [engineering(speed, "m/s") for speed in speeds[1:]]
     again = f"; again at {', '.join(others)}" if others else ""
     return f"{limit:.3g} % lost at {engineering(speeds[0], 'm/s')}: {', '.join(points)} points{order}{again}"
-
-
-def _unit(scenario: Scenario, key: str) -> str:
-    return quantities(scenario)[key][0].unit
