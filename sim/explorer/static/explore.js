@@ -74,6 +74,7 @@ async function answer(name) {
     const found = await ask(ADDRESSES.get(name) ?? name, question);
     asked.delete(name);
     update(change.answered(state, name, question, found));
+    if (name === "curves") draw(); // at once, not in the next frame
   } catch (fault) {
     failed.set(name, question);
     asked.delete(name);

@@ -324,13 +324,33 @@ function data(state) {
  * @type {{ shown: import("./figure.js").Panel[], node: import("./figure.js").Node | null, width: number, shared: boolean }} */
 export const drawn = { shown: [], node: null, width: 0, shared: true };
 
-/** Draw the figure.
+/** @type {Map<string, any[]>} */
+const seen = new Map();
+
+/** Return true if any part of what is drawn is another one than at the last call of a name.
+ * @param {string} name
+ * @param {any[]} parts */
+function isNew(name, parts) {
+  const before = seen.get(name);
+  seen.set(name, parts);
+  return !before || parts.some((part, k) => part !== before[k]);
+}
+
+/** Draw the figure. While the curves of a move are under way all of it stays that of the numbers before.
  * @param {State} state
  * @param {{ isDark: boolean, isNarrow: boolean }} screen */
 function plot(state, { isDark, isNarrow }) {
   const look = theme(isDark);
   const isMotion = state.view.figure === "motion";
   $("live").hidden = !isMotion;
+  const { answers, motion, view, run, pin, reading: place } = state;
+  const { curves, before, others, band } = answers;
+  const looks = [isDark, isNarrow, $("plot").clientWidth, $("numbers").open];
+  const parts = [curves, before, others, band, motion.columns, motion.pieces, view, run, pin, place, ...looks];
+  if (!isNew("plot", parts)) {
+    if (isMotion && drawn.node) now(state, { isDark });
+    return;
+  }
   const shown = panels(state, look, isNarrow);
   drawn.shown = shown;
   $("reader").hidden = !shown.length;
@@ -490,7 +510,7 @@ function contact(state, { isDark }) {
   const found = current(state, "contact");
   $("contact").classList.toggle("earlier", !found);
   $("scene").classList.toggle("earlier", !found);
-  if (!found) return;
+  if (!found || !isNew("contact", [found, isDark, $("words").clientWidth])) return;
   const { radius, speed } = found;
   const map = found.stress ? mapOf(found, 0) : null;
   const colours = map
