@@ -533,7 +533,8 @@ def _loss(
     limit, least, most = 100.0 * share, np.nanmin(lost), np.nanmax(lost)
     place = "speed" if swept is None else "value"
     if np.all(lost[np.isfinite(lost)] >= limit):
-        return f"{limit:.3g} % or more of the area is lost at every {place} shown: {least:.3g} to {most:.3g} %"
+        ends = sorted({f"{least:.3g}", f"{most:.3g}"}, key=float)
+        return f"{limit:.3g} % or more of the area is lost at every {place} shown: {' to '.join(ends)} %"
     if most < 1e-6:
         return f"No area is lost at any {place} shown"
     if not np.any(lost >= limit):

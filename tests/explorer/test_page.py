@@ -350,8 +350,14 @@ def test_the_sentence_says_so_if_a_share_is_lost_everywhere_or_the_contact_is_op
 
     masked = {"shear.spectrum.rms": 1e7}
     lost = 100.0 * (1.0 - curves(page.read(masked), page.speeds)["area_ratio"])
-    assert words(masked) == (
-        f"10 % or more of the area is lost at every speed shown: {lost.min():.3g} to {lost.max():.3g} %"
+    # Hertz's contact at all speeds, so that both ends are the same number
+    assert np.ptp(lost) < 1e-9
+    place = "10 % or more of the area is lost at every speed shown"
+    assert words(masked) == f"{place}: {lost.min():.3g} %"
+    wide = {"shear.spectrum.rms": 1.3e5}
+    lost = 100.0 * (1.0 - curves(page.read(wide), page.speeds)["area_ratio"])
+    assert words(wide, 0.05) == (
+        place.replace("10", "5", 1) + f": {lost.min():.3g} to {lost.max():.3g} %"
     )
     assert "open everywhere" in words({"contact.load": -0.1})
     alone = {"shear.paid_by_adhesion": 0.0, "adhesion.bond_share": 0.0}

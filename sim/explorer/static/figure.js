@@ -232,7 +232,7 @@ function shapes(mark, right, up, ends) {
   }
   return x.flatMap((at, k) => {
     const value = y[k];
-    if (at === null || value === null) return [];
+    if (at === null || value === null || !Number.isFinite(right(at))) return [];
     const [across, along] = [right(at), up(value)];
     const error = mark.high?.[k] ?? 0;
     const bar = h("path", {

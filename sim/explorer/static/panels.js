@@ -303,8 +303,9 @@ function ofMotion(state, theme, narrow) {
   if (columns.normal_load) return ofMount(state, theme, over);
   const area = over("contact_area", "area A", "m^2", false, COLOURS.bonds);
   if (columns.spring_force) return [over("spring_force", "spring force", "N", true), area];
-  if (columns.slider_position) return [over("slider_position", "displacement of the slider", "m", true), area];
-  return [over("friction_force", "friction F", "N", true), area];
+  const friction = over("friction_force", "friction F", "N", true);
+  if (columns.slider_position) return [over("slider_position", "displacement", "m", true), friction, area];
+  return [friction, area];
 }
 
 /** @param {Numbers} values */

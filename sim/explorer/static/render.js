@@ -453,7 +453,9 @@ export function now(state, { isDark }) {
   const look = theme(isDark);
   const { motion } = state;
   const width = Math.max(300, $("live").clientWidth);
-  $("scene-live").replaceChildren(built(picture(state, look, width, waves(current(state, "contact")))));
+  const map = waves(current(state, "contact"));
+  $("waves").hidden = !map;
+  $("scene-live").replaceChildren(built(picture(state, look, width, map)));
   $("moment").textContent = reading(state) + (motion.note ? ` · ${motion.note}` : "");
   const ended = hasEnded(motion, state.start);
   $("play").textContent = ended ? "Play again" : motion.paused ? "Play" : "Pause";

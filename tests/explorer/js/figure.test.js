@@ -90,6 +90,16 @@ test("a figure has a name, a description and no markup of a hostile label", () =
   assert.ok(!text.includes("<script>") && text.includes("&lt;script>") && text.includes("<desc"));
 });
 
+test("a point that a logarithmic axis cannot show is not drawn", () => {
+  const log = { label: "x", low: 0.1, high: 10, log: true };
+  const axis = { label: "y", low: 0, high: 1, log: false };
+  const mark = { kind: "points", x: [0, 1], y: [0.5, 0.5], colour: "#000", name: "own" };
+  const about = { width: 400, theme: THEME, title: "", description: "" };
+  const text = written(figure([{ x: log, y: axis, height: 100, marks: [mark] }], about));
+  assert.equal(text.match(/<circle/g)?.length, 1);
+  assert.ok(!text.includes("Infinity") && !text.includes("NaN"));
+});
+
 test("a motion is read between its records, and its ratio to real time has words", () => {
   const motion = { columns: { t: [0, 1, 2], a: [0, 10, null] }, time: 0.25 };
   assert.equal(at(motion, "a"), 2.5);
