@@ -40,7 +40,9 @@ page:
 	@if ! command -v node >/dev/null 2>&1; then \
 	  echo "make: Node.js is missing: the JavaScript of the page is not checked; install Node.js 20 or later"; \
 	else \
-	  { test -d node_modules || npm install --silent --no-audit --no-fund --no-package-lock; } && npm test --silent; \
+	  node --test tests/explorer/js/*.test.js && \
+	  if test -d node_modules || npm install --silent --no-audit --no-fund --no-package-lock; then npm run --silent check; \
+	  else echo "make: npm installed nothing: types and form of the JavaScript are not checked"; fi; \
 	fi
 
 .PHONY: .verify-laws .verify-parts .verify-runs .verify-lowest
