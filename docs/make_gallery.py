@@ -212,8 +212,11 @@ class Entry(NamedTuple):
 
 
 def labels(figure: Figure) -> list[str]:
-    """Return the words of a figure: legends, titles and names of axes, without the numbers at ticks."""
-    texts = {text.get_text() for text in figure.findobj(Text)}
+    """Return the words of a figure: legends, titles and names of axes, without the numbers at ticks.
+
+    Lines of a text are joined, because a text is broken only when its figure is drawn.
+    """
+    texts = {text.get_text().replace("\n", " ") for text in figure.findobj(Text)}
     return sorted(
         text
         for text in texts
