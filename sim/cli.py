@@ -392,13 +392,16 @@ def _goal(scene: Any, within: str | None, of: str | None, budget: str | None) ->
                 f'{name} belongs to --within "1 %", which is missing'
             )
         return None
+    from sim.units.errors import BadInput
     from sim.units.quantity import read_option
 
     error = (
         table.within
         if within is None
-        else read_option(within, "--within", "1", above=0, below=1)
+        else read_option(within, "--within", "1", above=0)
     )
+    if not error < 1.0:
+        raise BadInput([f"--within {within}: must be below 100 %"])
     names = () if table is None else table.of
     if of is not None:
         names = tuple(name.strip() for name in of.split(",") if name.strip())

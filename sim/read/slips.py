@@ -197,8 +197,8 @@ def unresolved_slips(dataset: xr.Dataset) -> list[str]:
     falls = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0)))
     if bool((falls > 0.0).any()):
         remarks.append(
-            "the spring force falls by 0.3 of its largest value or more while the slider "
-            "is faster than the stage, but less than ten times: this is no slip event; "
+            "the spring force falls by 0.3 of its largest value so far or more while the "
+            "slider is faster than the stage, but less than ten times: this is no slip event; "
             "if the fall takes a few clock steps only, reduce clock.step"
         )
     # of a run without slips, or without single ones

@@ -556,9 +556,9 @@ class Search:
         closest = min(fits or rows, key=lambda row: (row.total, row.work))
         settings = ", ".join((*closest.labels, f"{closest.members:,} members"))
         raise NotReached(
-            f"{_percent(self.goal.within)} is not reached within a budget of "
-            f"{engineering(self.goal.budget, 's')}; {_percent(closest.total)} is, with "
-            f"{settings}"
+            f"{_accepted(self.goal.within)} is not reached within a budget of "
+            f"{engineering(self.goal.budget, 's')}; the least bound that was found is "
+            f"{_percent(closest.total)}, with {settings}; a larger --budget may find less"
         )
 
     def _measured(self, row: Choice, finest: Choice) -> Choice:
@@ -634,9 +634,19 @@ def _words(part: str, changes: dict[str, Any]) -> str:
     return f"{part} " + " ".join(map(str, changes.values()))
 
 
-def _percent(error: float) -> str:
-    """Return an error with two digits, and one that is as large as the quantity without digits."""
-    return f"{100.0 * error:.2g} %" if error < 0.995 else f"{100.0 * error:,.0f} %"
+def _accepted(error: float) -> str:
+    """Return an accepted error as it was given."""
+    return f"{100.0 * error:.6g} %"
+
+
+def _percent(bound: float) -> str:
+    """Return a bound with three digits, rounded up, and one that is as large as the quantity without digits."""
+    percent = 100.0 * bound
+    if not 0.0 < percent < 99.0:
+        return f"{percent:,.0f} %"
+    unit = 10.0 ** (math.floor(math.log10(percent)) - 2)
+    # a bound that has three digits but for a rounding stays
+    return f"{math.ceil(percent / unit - 1e-9) * unit:.3g} %"
 
 
 class Answer(NamedTuple):
@@ -676,7 +686,7 @@ def answer(scenario: Scenario, goal: Goal) -> Answer:
         settings.append(f"judged at {search.points} of {count} points of the sweep")
     as_written = _percent(written_choice.total)
     sentence = (
-        f"within {_percent(goal.within)}: errors of at most {', '.join(parts)}; "
+        f"within {_accepted(goal.within)}: errors of at most {', '.join(parts)}; "
         f"{', '.join(settings)}, {engineering(best.work, 's')} of counted work "
         f"(as written: {engineering(written_choice.work, 's')}, within {as_written})"
     )

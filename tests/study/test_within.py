@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -186,3 +187,15 @@ def test_the_true_error_is_within_the_target():
                     held.append(bool(off <= target * unit))
     assert len(held) > 100
     assert np.mean(held) >= 0.95
+
+
+def test_an_accepted_error_is_said_as_it_was_given_and_no_bound_is_said_too_small():
+    done = command("run", "scenarios/decomposition.toml", "--within", "200 %")
+    assert done.exit_code != 0 and "below 100 %" in done.output + done.stderr
+    sentence = answer(lens(), Goal(0.0145)).sentence
+    assert sentence.startswith("within 1.45 %: ")
+    budget = json.loads(answer(lens(), Goal(0.0145)).attributes["accuracy"])["errors"]
+    for name, bounds in budget.items():
+        words, total = name.replace("_", " "), 100.0 * sum(bounds.values())
+        (text,) = re.findall(rf"{words} ([\d.]+) %", sentence)
+        assert total * (1.0 - 1e-8) <= float(text) <= 1.01 * total
