@@ -280,15 +280,20 @@ MEAN = {
     ],
 )
 def test_without_noise_a_slip_does_not_depend_on_the_clock_step(keys):
-    coarse, fine = (slipping(step, 1.0, 20, **keys) for step in (1.0, 0.125))
-    # next to no noise with so many degrees of freedom
-    for lens in (coarse, fine) if keys is not MEAN else ():
-        bands = dataclasses.replace(
-            lens.process.bands, weight=lens.process.bands.weight / 1e12
-        )
-        bands = dataclasses.replace(bands, freedom=1e12 * bands.freedom)
-        lens.__dict__["process"] = dataclasses.replace(lens.process, bands=bands)
-    assert_allclose(losses(coarse, 0.2), losses(fine, 0.2), rtol=3e-3)
+    """The phase of the slips in a clock step moves the loss of one run by 0.4 %, so that many stages are compared."""
+    differences = []
+    for speed in 20.0 * (1.0 + 0.005 * np.arange(16)):
+        coarse, fine = (slipping(step, 1.0, speed, **keys) for step in (1.0, 0.125))
+        # next to no noise with so many degrees of freedom
+        for lens in (coarse, fine) if keys is not MEAN else ():
+            bands = dataclasses.replace(
+                lens.process.bands, weight=lens.process.bands.weight / 1e12
+            )
+            bands = dataclasses.replace(bands, freedom=1e12 * bands.freedom)
+            lens.__dict__["process"] = dataclasses.replace(lens.process, bands=bands)
+        differences.append(losses(coarse, 0.2) / losses(fine, 0.2) - 1.0)
+    assert np.std(differences) / math.sqrt(len(differences) - 1) < 1e-3
+    assert abs(np.mean(differences)) < 3e-3
 
 
 @pytest.mark.verify
