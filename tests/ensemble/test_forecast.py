@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import psutil
@@ -19,6 +18,7 @@ from helpers.scenes import sample
 from numpy.testing import assert_allclose
 
 import sim
+from benchmarks.spring import DRAWN, KICKED
 from benchmarks.timing import child
 from sim.ensemble import pace, plan as plans, preview
 from sim.ensemble.dataset import identity
@@ -206,28 +206,6 @@ def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(
 
 
 BELL = {"model": "bell", "zero_force_rate": 20.0, "bell_force": 2e-11}
-#: A slider whose body rings a period in a clock step.
-KICKED: dict[str, Any] = {
-    "solid": {"shear_modulus": 1.5e6},
-    "sphere": {"radius": 2.2e-3},
-    "adhesion": {"work": 0.044},
-    "contact": {"load": 4e-3},
-    "drive": {
-        "model": "spring",
-        "stage": 1.2e-3,
-        "stiffness": 140.0,
-        "mass": 1.5e-5,
-        "damping": 0.06,
-        "start": "steady",
-    },
-    "bonds": {
-        "model": "rate",
-        "rupture": BELL | {"zero_force_rate": 25.0, "bell_force": 4e-12},
-        "bond_stiffness": 8e-7,
-        "rebinding_rate": 250.0,
-        "site_density": 6.5e16,
-    },
-}
 #: Driven sliders whose clock steps take very many sub-steps each, with a rest, rupture at a cut-off, bonds that are
 #: followed one by one, and a body on cohorts that grow from nothing.
 LONG = {
@@ -294,22 +272,7 @@ LONG = {
         "clock": {"duration": 10.0, "step": 1e-3},
         "bonds": KICKED["bonds"] | {"model": "tracked", "sites": 20},
     },
-    "a slider that draws of the stored energy kick": KICKED
-    | {
-        "clock": {"duration": 1.0, "step": 1e-3},
-        "shear": {
-            "model": "banded",
-            "cell": 2.4e-4,
-            "points": 256,
-            "spectrum": {
-                "model": "von_karman",
-                "rms": 1.2e5,
-                "length": 9e-6,
-                "hurst": 0.5,
-            },
-            "correlation": {"model": "slip", "length": 6e-6},
-        },
-    },
+    "a slider that draws of the stored energy kick": KICKED | DRAWN,
     "cohorts under a force": {
         "clock": {"duration": 1e-3, "step": 1e-5},
         "contact": {"load": 1e-5},
