@@ -6,6 +6,7 @@ table. ``sim.parts.contact.balance`` has the contact under each.
 """
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple, Protocol, cast
 
@@ -262,6 +263,8 @@ class EffectiveWork(NamedTuple):
 _KINDS = ("load", "indentation", "displacement")
 #: Halvings of a clock step that find a moment in it down to rounding.
 _HALVINGS = 48
+#: Change of a closed radius in a step, over it, that may be a jump; and that of a jump at its moment.
+_MAY_JUMP, _JUMPS = 0.02, 1e-3
 
 _Load = over_time(Quantity("N", "normal load, compression positive", "P"), "load")
 _Indentation = over_time(
@@ -594,20 +597,25 @@ class Equilibrium(_Controlled):
             during(state.dissipated, len(radius)),
         )
         turn = np.full((*radius.shape, len(TURN.names or ())), np.nan)
-        if np.isnan(radius).any() or np.isnan(state.radius).any():
-            before = np.concatenate([state.radius[np.newaxis], radius[:-1]])
-            is_open, was_open, lost = (
-                np.isnan(radius),
-                np.isnan(before),
-                np.zeros(radius.shape),
-            )
-            opens, closes = is_open & ~was_open, was_open & ~is_open
+        before = np.concatenate([state.radius[np.newaxis], radius[:-1]])
+        is_open, was_open = np.isnan(radius), np.isnan(before)
+        opens, closes = is_open & ~was_open, was_open & ~is_open
+        # on a layer a closed contact may have two stable radii
+        leaps = np.zeros(radius.shape, bool)
+        if balance.bodies.body[2] > 0.0:
+            leaps = np.abs(radius - before) > _MAY_JUMP * before
+        if opens.any() or closes.any() or leaps.any():
+            lost = np.zeros(radius.shape)
             left = np.concatenate(
                 [
                     np.broadcast_to(state.work, radius[:1].shape),
                     self._left(radius, balance)[:-1],
                 ]
             )
+            if leaps.any():
+                start, end = (left[leaps], before[leaps]), radius[leaps]
+                course = self._within(leaps, start, motions, duration, balance)
+                lost[leaps] = self._lost_in_jump(course, start[1], end)
             for happens in (opens, closes):
                 if happens.any():
                     start = left[happens], before[happens]
@@ -615,6 +623,7 @@ class Equilibrium(_Controlled):
                         happens, start, motions, duration, balance
                     )
             dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
+        if is_open.any() or was_open.any():
             opened = np.where(opens, motions.time, np.nan)
             detached = np.fmax.accumulate(np.concatenate([detached[:1], opened]))[1:]
         work, phases = (
@@ -622,6 +631,77 @@ class Equilibrium(_Controlled):
             self._phases(state, control, balance),
         )
         return ContactState(work, radius, detached, dissipated, phases, turn)
+
+    def _within(
+        self,
+        happens: Flags,
+        start: tuple[Array, Array],
+        motions: Motion,
+        duration: float,
+        balance: Balance,
+    ) -> Callable[[Array], tuple[Control, Balance]]:
+        """Return a function that returns control and balance at a share of some steps, shape (contacts, 1).
+
+        ``happens`` and ``start`` are as of ``_turns``: in a step the work of adhesion changes linearly.
+        """
+        steps, rows = np.nonzero(happens)
+        work, radius = (values[:, np.newaxis] for values in start)
+        bonded, fluctuating, stress = (
+            np.broadcast_to(values, happens.shape)[steps, rows][:, np.newaxis]
+            for values in (balance.bonded, balance.fluctuating, balance.stress)
+        )
+        at_end = balance._replace(
+            bonded=bonded,
+            fluctuating=fluctuating,
+            stress=stress,
+            margin=balance.margin and balance.margin.at(motions.position[steps]),
+        )
+        change = self._left(radius, at_end) - work
+
+        def at(share: Array) -> tuple[Control, Balance]:
+            rest = 1.0 - share
+            control = self.control(
+                motions.time[steps] - rest * motions.duration[steps], duration
+            )
+            return control, at_end._replace(bonded=at_end.bonded - rest * change)
+
+        return at
+
+    def _lost_in_jump(
+        self,
+        at: Callable[[Array], tuple[Control, Balance]],
+        before: Array,
+        after: Array,
+    ) -> Array:
+        """Return the energy [J] that contacts lose which jump within a step from one stable radius to another.
+
+        Both radii [m] are those at the ends of the step, and ``at`` is that of ``_within``. The moment is found by
+        bisection: a jump is left there, and a smooth change is not, which loses nothing.
+        """
+        first, last = before[:, np.newaxis], after[:, np.newaxis]
+        early, late = np.zeros(first.shape), np.ones(first.shape)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (early + late)
+            size = self.equilibrium(*at(middle))
+            is_late = np.abs(size - last) < np.abs(size - first)
+            first, last = np.where(is_late, first, size), np.where(is_late, size, last)
+            early, late = (
+                np.where(is_late, early, middle),
+                np.where(is_late, middle, late),
+            )
+        control, there = at(late)
+        energies = [
+            control.energy(
+                radius,
+                there.gained(radius, self.reversible),
+                there.bodies,
+                self._left(radius, there),
+            )
+            for radius in (first, last)
+        ]
+        jumps = np.abs(last - first) > _JUMPS * first
+        lost = np.where(jumps, energies[0] - energies[1], 0.0)
+        return np.maximum(lost, 0.0)[:, 0]
 
     def _turns(
         self,
@@ -656,29 +736,11 @@ class Equilibrium(_Controlled):
         linearly, so that the load has no error by the length of the step if the control alone opens the contact. A
         control that jumps acts on the contact as it was before.
         """
-        steps, rows = np.nonzero(happens)
-        work, radius = (values[:, np.newaxis] for values in start)
-        bonded, fluctuating, stress = (
-            np.broadcast_to(values, happens.shape)[steps, rows][:, np.newaxis]
-            for values in (balance.bonded, balance.fluctuating, balance.stress)
-        )
-        at_end = balance._replace(
-            bonded=bonded,
-            fluctuating=fluctuating,
-            stress=stress,
-            margin=balance.margin and balance.margin.at(motions.position[steps]),
-        )
-        change = self._left(radius, at_end) - work
+        steps, _ = np.nonzero(happens)
+        at = self._within(happens, start, motions, duration, balance)
+        radius = start[1][:, np.newaxis]
         opens = ~np.isnan(radius)
         before, after = np.zeros(radius.shape), np.ones(radius.shape)
-
-        def at(share: Array) -> tuple[Control, Balance]:
-            rest = 1.0 - share
-            control = self.control(
-                motions.time[steps] - rest * motions.duration[steps], duration
-            )
-            return control, at_end._replace(bonded=at_end.bonded - rest * change)
-
         for _ in range(_HALVINGS):
             middle = 0.5 * (before + after)
             control, there = at(middle)
