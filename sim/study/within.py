@@ -473,10 +473,11 @@ class Search:
     def choices(self) -> list[Choice]:
         """Return all combinations of one setting a part, the cheapest first. Errors add up, and so does the work.
 
-        Each has the fewest members that keep the accepted error, or else those of the scene.
+        Of equal work, that with the fewest changes of the scene comes first. Each has the fewest members that keep the
+        accepted error, or else those of the scene.
         """
         result = [self._combined(rows) for rows in itertools.product(*self.settings())]
-        return sorted(result, key=lambda choice: (choice.work, choice.total))
+        return sorted(result, key=lambda row: (row.work, len(row.labels), row.total))
 
     def _combined(self, rows: tuple[Setting, ...]) -> Choice:
         """Return a combination of settings."""

@@ -78,6 +78,12 @@ def test_a_scene_without_noise_keeps_its_members_and_needs_no_noise():
     assert result.scenario.ensemble == scene.ensemble
 
 
+def test_a_setting_that_costs_the_same_is_not_changed():
+    scene = sim.load("scenarios/friction_maximum.toml")
+    sentence = answer(scene, Goal(0.003, ("friction_force",))).sentence
+    assert "; settings as written, " in sentence
+
+
 def test_each_swept_point_is_in_the_run():
     scene = sim.load("scenarios/ten_wavelengths.toml")
     result = answer(scene, Goal(0.02))
