@@ -11,6 +11,7 @@ import xarray as xr
 from scipy import special
 
 from sim.quantities import LOST, loss_in_words
+from sim.read.clock_delay import of_course
 from sim.read.correlation import LEVEL, Array
 from sim.read.dataset import (
     MEMBERS,
@@ -63,6 +64,8 @@ _BEYOND = (
 )
 #: Names of branches by the sign of the change of the speed.
 _WAYS = {1.0: "increasing speed", -1.0: "decreasing speed"}
+#: Causes of the bound of a speed: the larger part is of the interpolation, or of the clock step.
+_CAUSES = ("interpolation", "step")
 #: Relative lag of a speed below which it is not stated.
 _UNSEEN = 1e-3
 
@@ -484,6 +487,11 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
         ``levels`` also the ``charges`` of that loss [1], such as ``lost_to_bonds_at_10_percent_lost``. Without
         ``levels`` empty if there is no curve of the area over the speed.
 
+    Notes
+    -----
+    Along a course the speed is that without the delay of the bonds by the clock step, and the bound holds what is not
+    known of this delay (``sim.read.clock_delay.of_course``).
+
     Raises
     ------
     BadInput
@@ -514,7 +522,9 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
     least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
     lasting: Any = [None] * len(left)
+    off = xr.zeros_like(speed)
     if along == "t":
+        speed, off = _without_delay(dataset, speed)
         lasting = _if_steady(dataset, [level for _, level, _ in left], bool(wanted))
     beside, result = means.to_array("quantity").drop_vars("quantity"), Estimates()
     how: Any = {
@@ -531,23 +541,28 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
         "output_dtypes": [*"dddddOd"],
         "vectorize": True,
     }
+    at_a_speed: Any = {"input_core_dims": [[], [along], [along]], "vectorize": True}
     for (name, level, loss), steady in zip(left, lasting, strict=True):
         *ends, why, others = xr.apply_ufunc(
             crossing, speed, means["area_ratio"], sizes, level, beside, **how
         )
         is_known, never = ends[0].notnull(), ends[0].isnull() & (level < least)
+        late = xr.apply_ufunc(_read_at, ends[0], speed, off, **at_a_speed)
+        ends[1], ends[2] = ends[1] - late, ends[2] + late
+        ends[4] = ends[4] + late
         columns = dict(
             zip(means, others.transpose("quantity", "end", ...), strict=True)
         )
         columns["area_ratio"] = xr.concat(ends, "end")
+        by_steps = bool((late > 0.5 * ends[4]).any())
         lag: list[Any] = [math.nan, True]
         if steady is not None:
             lag = _lag(ends, steady[0], steady[1], speed)
         for key, numbers in columns.items():
-            stem, unit = str(key), "1"
+            stem, unit, source = str(key), "1", "interpolation"
             text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
             if key == "area_ratio":
-                stem, unit = "speed", "m/s"
+                stem, unit, source = "speed", "m/s", _CAUSES[by_steps]
                 of = "stage" if speed_name(dataset) == "stage_speed" else "slider"
                 text = (
                     f"speed of the {of} at which the mean contact area has lost {loss}"
@@ -565,7 +580,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
                 error,
                 low,
                 high,
-                bound.where(~never).assign_attrs(source="interpolation"),
+                bound.where(~never).assign_attrs(source=source),
                 reason=reason.drop_attrs(deep=False),
             )
         if steady is not None and bool((lag[0].notnull() & lag[1]).any()):
@@ -573,6 +588,24 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
             value = labelled(lag[0].where(lag[1]), "m/s", text)
             result[f"steady_speed_{name}"] = Estimate(value)
     return result
+
+
+def _without_delay(
+    dataset: xr.Dataset, speed: xr.DataArray
+) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return the speed that the bonds feel along a course, and by how much it may be off by the clock step."""
+    course = abs(speed_of(dataset))
+    growth = course.differentiate("t") / course.where(course > 0.0)
+    delay = of_course(dataset, abs(growth))
+    earlier = speed * np.exp(-(growth * delay.time).fillna(0.0))
+    return earlier, (abs(growth) * earlier * delay.bound).fillna(0.0)
+
+
+def _read_at(at: float, speed: Array, values: Array) -> float:
+    """Return the value at the speed of a course that is nearest to one; 0 if that is unknown."""
+    if math.isnan(at):
+        return 0.0
+    return float(values[np.nanargmin(abs(speed - at))])
 
 
 def _lag(

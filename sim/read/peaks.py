@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
+from sim.read.clock_delay import of_maxima
 from sim.read.correlation import LEVEL, Array
 from sim.read.dataset import (
     MEMBERS,
@@ -122,10 +123,6 @@ def peaks(dataset: xr.Dataset) -> Estimates:
     return result
 
 
-#: Relaxation rate times half a clock step from which on bonds have forgotten the step before.
-_FORGOTTEN = 10.0
-
-
 class Late(NamedTuple):
     """Time by which a maximum along a ramp is found late, the speed at its true time, and what may be left of both."""
 
@@ -138,26 +135,8 @@ class Late(NamedTuple):
 def _late_by_steps(
     dataset: xr.Dataset, when: xr.DataArray, speed: xr.DataArray
 ) -> Late:
-    """Return by how much the clock step makes a maximum late that is found at a time [s] and a speed [m/s] of a ramp.
-
-    Notes
-    -----
-    During a clock step dt bonds have the mean speed of the step, which is that at its
-    middle, but time and speed of a sample are those at its end. Bonds without a memory
-    are therefore found dt/2 late. Bonds that relax exponentially at a rate k have the
-    delay ``dt/2 coth(x)`` with ``x = k dt/2`` in place of 1/k. They are found L(x) dt/2
-    late, with Langevin's function ``L(x) = coth(x) - 1/x``. The rate k is that of
-    rebinding over the share of bonds that is left, as in a rate equation.
-
-    Two errors remain. In other models k may differ by a factor, which changes the delay
-    by about 1/k. The maximum between samples is that of a parabola, whose vertex is off
-    by dt² f'''/(6 f''). Over the logarithm of the speed the third derivative of the stress
-    is at most about three times the second, and a linear ramp adds three. With the
-    relative change h of the speed in a step the vertex is therefore off by at most h dt.
-    Bonds that remember a step (x < 10) are sought by their slopes at the speed of the
-    samples, and their maximum is only known to a step.
-    """
-    step, duration = setting(dataset, "clock.step"), setting(dataset, "clock.duration")
+    """Return by how much the clock step delays a maximum found at a time [s] and a speed [m/s] of a ramp."""
+    duration = setting(dataset, "clock.duration")
     is_log = word(dataset, "drive.scale", "") == "log"
     first, last = (speed_of(dataset).isel(t=k, drop=True) for k in (0, -1))
     with contextlib.suppress(KeyError):  # tables of a drive that are swept whole
@@ -167,22 +146,8 @@ def _late_by_steps(
     # the growth of the magnitude of the speed
     slope = (size * np.log(ratio)).where(is_log, (last - first) * np.sign(speed))
     slope = slope / duration
-    memory = xr.DataArray(math.inf)
-    with contextlib.suppress(KeyError):
-        memory = setting(dataset, "bonds.rebinding_rate")
-        with contextlib.suppress(KeyError):
-            memory = setting(dataset, "bonds.rebinding_rate_at_temperature")
-        if "bond_fraction" in dataset and MEMBERS not in dataset["bond_fraction"].dims:
-            at = when.fillna(0.0)
-            left = dataset["bond_fraction"].sel(t=at, method="nearest").drop_vars("t")
-            memory = memory / left
-    half = 0.5 * memory * step
-    with np.errstate(over="ignore", divide="ignore"):
-        exact = 1.0 / np.tanh(half) - 1.0 / half
-        langevin = xr.where(half > 1e-3, exact, half / 3.0)
-    late = 0.5 * step * langevin
     change = abs(slope) / size.where(size > 0.0)
-    bound = (step * step * change + 1.0 / memory).where(half >= _FORGOTTEN, step)
+    late, bound = of_maxima(dataset, when, change)
     earlier = (size * np.exp(-slope / size * late)).where(is_log, size - slope * late)
     return Late(late + 0.0 * when, earlier, bound, change * size * bound)
 

@@ -151,6 +151,34 @@ def test_the_share_of_long_waves_is_the_integral_of_the_spectrum():
     assert_allclose(shares, [1.0, 0.0], rtol=1e-15)
 
 
+@pytest.mark.parametrize("rate", ["50 1/s", "5000 1/s"])
+def test_the_error_of_the_clock_step_along_a_ramp_is_that_of_two_runs(rate):
+    """A run with a hundredth of the step has a hundredth of the error. Weak fluctuations give the scene a cell."""
+    keys = {
+        "clock": {"duration": "2 s", "step": "10 ms"},
+        "drive": {"model": "ramp", "from": "10 um/s", "to": "100 mm/s", "scale": "log"},
+        "bonds": {
+            "model": "rate",
+            "critical_speed": "10 mm/s",
+            "rebinding_rate": rate,
+            "stress": "0.1 MPa",
+        },
+        "shear": LENS | {"spectrum": GAUSSIAN | {"rms": "1 Pa"}},
+    }
+    coarse = load(tomllib.loads(BASE) | keys)
+    fine = coarse.with_values({"clock.step": 1e-4, "clock.record": 1e-2})
+    runs = [run(each) for each in (coarse, fine)]
+    ratio = [
+        each["contact_area"].mean("member") / each["jkr_radius"] ** 2 for each in runs
+    ]
+    off = (ratio[0] - ratio[1]) / math.pi
+    stated = systematic_errors(coarse)
+    at = int(abs(runs[0]["speed"] - stated["error_speed"]).argmin("t"))
+    assert stated["step_error_area"] > 1e-3
+    # the change of the speed in a step, and a hundredth of the error in the fine run
+    assert_allclose(stated["step_error_area"], off[at], rtol=math.log(1e4) / 200 + 0.02)
+
+
 def test_the_systematic_error_covers_what_the_cell_leaves_out_and_its_cure_works(scene):
     lens = scene(shear=LENS, **{"ensemble.members": 64})
     stated, exact = systematic_errors(lens), float(area(W - STORED) / area(W))

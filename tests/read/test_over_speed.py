@@ -215,6 +215,68 @@ def test_branches_of_a_course_lag_both_ways_and_the_steady_speed_is_that_of_the_
         assert all("lags" in reason for reason in result[f"speed_{name}"].reason.values)
 
 
+def course(part, step, **parts):
+    """Return the speeds of three losses along a ramp of four decades in 2 s, over the clock step."""
+    ramp = drive.Ramp(start=1e-5, stop=0.1, scale="log")
+    parts = {"drive": ramp, "shear": shear.Uniform()} | parts
+    dataset = run(scene(bonds=part, clock=Clock(2.0, step), **parts))
+    return read.loss_speeds(dataset, ["2 %", "5 %", "15 %"])
+
+
+@pytest.mark.parametrize(
+    ("part", "is_exact"),
+    [
+        *(
+            (bonds.Rate(critical_speed=1e-2, rebinding_rate=rate), True)
+            for rate in (5.0, 50.0, 500.0, 5000.0)
+        ),
+        (
+            bonds.Cohort(
+                rupture=bonds.Bell(zero_force_rate=50.0, bell_force=4e-12),
+                bond_stiffness=4e-4,
+                rebinding_rate=500.0,
+                site_density=9e16,
+            ),
+            False,
+        ),
+    ],
+)
+def test_a_loss_along_a_ramp_is_at_the_speed_that_the_bonds_feel(part, is_exact):
+    """Bonds have one speed in a clock step, here 5 %. At a hundredth of the step it makes 100 times less difference."""
+    step, growth = 1e-2, math.log(1e4) / 2.0
+    coarse, fine = course(part, step), course(part, step / 100.0)
+    found = 0
+    for name, at_steps in coarse.items():
+        if not name.startswith("speed") or not np.isfinite(at_steps.value):
+            continue
+        value, bound = (float(each) for each in (at_steps.value, at_steps.bound))
+        truth, rest = (float(each) for each in (fine[name].value, fine[name].bound))
+        assert abs(value - truth) <= bound + rest, name
+        assert float(at_steps.low) < truth + rest < float(at_steps.high) + 2.0 * rest
+        if is_exact:  # to the second order of the change of the speed in a step
+            assert bound < 1.2 * (growth * step) ** 2 * value
+        found += 1
+    assert found >= 1
+
+
+def test_what_fluctuates_beside_bonds_along_a_ramp_leaves_its_part_of_the_delay_open():
+    """A delay of the bonds between nothing and half a step is within the bound, and its cause is named."""
+    field = shear.Modal(
+        spectrum=Band(rms=60e3, longest=60e-6, shortest=24e-6),
+        correlation=Time(time=1.0),
+        cell=0.2e-3,
+    )
+    part, step, growth = (
+        bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0),
+        1e-2,
+        math.log(1e4) / 2.0,
+    )
+    result = course(part, step, shear=field)["speed_at_5_percent_lost"]
+    assert result.source == "step"
+    least = 0.25 * growth * step * float(result.value)
+    assert least < float(result.bound) < 2.5 * least
+
+
 def test_a_course_that_nothing_delays_has_no_other_speed_if_steady():
     for part in (
         bonds.Steady(critical_speed=5e-3),

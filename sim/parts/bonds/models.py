@@ -30,6 +30,7 @@ from sim.laws import schallamach
 from sim.laws.schallamach import (
     Body,
     Onset,
+    delay_by_steps,
     linear_onset,
     relaxed,
     steady_fraction,
@@ -97,6 +98,10 @@ class _BondModel(Part):
 
     def why(self, area: float, forces: bool) -> str:
         return ""
+
+    def delay(self, speed: Array, step: float) -> Array:
+        """Return by how much a clock step delays the bonds along a course of the speed [s], at most."""
+        return np.full(speed.shape, 0.5 * step)
 
     def followed(self, speeds: Array, step: float) -> float:
         """Return the mean number of bond lives that are followed in a step of one member at speeds [m/s]."""
@@ -291,6 +296,9 @@ class _AtOnce(_WithoutStretch):
         stiffness = np.where(np.isnan(area), np.nan, stiffness)
         return Onset(stiffness, np.full(speed.shape, np.nan))
 
+    def delay(self, speed: Array, step: float) -> Array:
+        return np.zeros(speed.shape)
+
     def _lost(self, speed: Array) -> Array:
         """Return the share of the bound sites that is lost as the speed grows [s/m], at speeds above 0."""
         return 1.0 / (self.critical_speed + speed)
@@ -361,6 +369,9 @@ class Rate(_OverArea, _WithoutStretch):
         return bonding._replace(
             stiffness=-self.rebinding_rate / self.critical_speed * bonding.strength
         )
+
+    def delay(self, speed: Array, step: float) -> Array:
+        return delay_by_steps(step, self.rebinding_rate / self._steady_fraction(speed))
 
 
 @keyed()
