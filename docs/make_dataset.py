@@ -88,6 +88,10 @@ accumulates under a load that cycles behind a stage at rest.
 
 Events are detected at the clock steps. They do not depend on the records.
 
+`peak_time`, `peak_speed`, those of the friction and those of the phases are the ones at which the maximum was found.
+Along a ramp bonds are late by up to half a clock step, which the tables take off as far as it is known:
+`sim.Run(dataset).statistic("peak_speed")`.
+
 A *phase* of a run is an interval in which no prescribed course turns, stops, starts or jumps. Within a phase, no
 prescribed speed changes its sign. Examples are rest and sliding of a `start`, approach and retraction of each cycle.
 If a run has several phases (at most 1,000), the events of each phase are recorded, too.

@@ -541,13 +541,14 @@ def stress_map(dataset: xr.Dataset) -> dict[str, Number]:
     left. The area has then fallen by {lost:.1f} %.""",
 )
 def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
-    top = int(dataset["shear_stress"].argmax("t"))
-    left = float(read.observables(dataset)["area_ratio"][top])
+    # area and bonds are as late as the stress, whose speed is that without the delay by the clock step
+    top = read.observables(dataset).interp(t=float(dataset["peak_time"]))
+    peaks = read.peaks(dataset)
     return {
-        "stress": 1e-3 * float(dataset["peak_stress"]),
-        "speed": 1e3 * float(dataset["speed"][top]),
-        "bound": 100.0 * float(dataset["bond_fraction"][top]),
-        "lost": 100.0 - 100.0 * left,
+        "stress": 1e-3 * float(peaks["peak_stress"].value),
+        "speed": 1e3 * float(peaks["peak_speed"].value),
+        "bound": 100.0 * float(top["bond_fraction"]),
+        "lost": 100.0 - 100.0 * float(top["area_ratio"]),
     }
 
 

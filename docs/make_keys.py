@@ -32,6 +32,13 @@ MOST_WORDS = 30
 #: Keys of the file itself that stand before its tables.
 _FIRST = ("name", "seed")
 
+#: What is taken for a key that is not given, where its meaning does not say it.
+OMITTED = {
+    "[clock.record]": "the clock step",
+    "[shear.cell]": "√π times the contact radius at rest",
+    "[shear.points]": "as many as the spectrum needs",
+}
+
 
 def text() -> str:
     """Return the page."""
@@ -96,7 +103,7 @@ def _row(key: str, field: typing.Any, titles: list[str]) -> tuple[str, str, str]
         simplest = model(field.default_factory)
         default = f"`{simplest}`" if simplest else "its defaults"
     elif field.default in (None, "", ()):
-        default = "not given"
+        default = OMITTED.get(place, "not given")
     if quantity is None and inner:
         return "", f"the table {place}", default
     meaning = quantity.meaning if quantity else field.description

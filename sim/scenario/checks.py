@@ -126,7 +126,7 @@ def _unknown_on_a_layer(scene: Scene) -> Faults:
         fault = "ΔΓ of a disc is known on a half-space only"
         yield ("shear", "contact"), f'{fault}: give "plane", or omit solid.thickness'
     if scene.widest > WIDEST * thickness:
-        fault = f"a contact of {scene.widest:.3g} m is wider than {WIDEST:g} times the layer, beyond the theory"
+        fault = f"the contact radius, {scene.widest:.3g} m, exceeds {WIDEST:g} times the thickness, beyond the theory"
         yield ("solid", "thickness"), f"{fault}: give a thicker layer"
 
 
@@ -367,7 +367,7 @@ def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
     thickness = scene.solid.thickness
     if thickness is not None and scene.widest > _COMPRESSED * thickness:
         yield (
-            f"the contact is {scene.widest / thickness:.3g} times as wide as the layer is thick: there the slight"
+            f"the contact radius is {scene.widest / thickness:.3g} times the thickness of the layer: there the slight"
             f" compressibility of real rubber matters, from about {_COMPRESSED:g} on"
         )
     share = known.capillary[1] / scene.widest if scene.widest else 0.0

@@ -172,7 +172,9 @@ ZeroForceRate = Annotated[
 ]
 HalfSpeed = Annotated[
     float,
-    Quantity("m/s", "speed at which half of the bonds are intact", "V_c", above=0),
+    Quantity(
+        "m/s", "speed at which half of the bonds of rest are left", "V_c", above=0
+    ),
 ]
 LargestStress = Annotated[
     float, Quantity("Pa", "largest shear stress in steady sliding", "tau", above=0)
