@@ -99,8 +99,8 @@ If a run has several phases (at most 1,000), the events of each phase are record
 [Events](events.md) has the definition of a slip event and of each other event.
 
 If members are kept, the first 1,000 slip events of each member are recorded one by one. Moments include all events.
-With `per_member = false` an event has a `<name>_count`, too. It is the number of members with that event, over which
-the mean and its error are taken.
+With `per_member = false` an event that a member has at most once has a `<name>_count`, too. It is the number of members
+with that event, over which the mean and its error are taken. (`slip_count` is the number of slip events of a member.)
 """,
     "Known before the run": "Only some models of `[shear]` have these errors. The largest are attributes, too.\n",
     "Stress maps": """`dataset.shear_map[0, 0].plot(x="x")` draws a map with the sliding direction
@@ -148,8 +148,9 @@ seeds = xarray.open_mfdataset(
 )
 ```
 
-`open_mfdataset` needs dask, which `pip install '.[cluster]'` adds. Without dask, `xarray.concat` joins the
-runs that `[sim.open(path) for path in paths]` has opened, with the same options.
+`open_mfdataset` needs dask, which `pip install '.[cluster]'` adds. Without dask, `xarray.concat` joins opened
+runs: `xarray.concat([run.set_coords("contact_load") for run in runs], "contact_load")`, and for seeds
+`xarray.concat(runs, "member", data_vars="minimal", coords="minimal", compat="override")`.
 
 Attributes are those of the first run. `t` counts seconds and is no date. Therefore `dataset.resample` needs
 `dataset.assign_coords(t=(1e9 * dataset.t).round().astype("timedelta64[ns]"))`.

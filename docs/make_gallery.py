@@ -585,8 +585,8 @@ def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
     "How does friction respond to a sudden change of the speed?",
     """Friction overshoots. When the stage jumps from {slow:g} to {fast:g} mm/s, the force rises from {before:.2f}
     mN to {peak:.2f} mN within {after:.1f} ms. The bonds are stretched further before more of them break. The force
-    settles at {settled:.2f} mN. After {length:.1f} µm of sliding the overshoot has fallen to one e-th. Back at the
-    old speed the force returns to {last:.2f} mN and never falls below.""",
+    settles at {settled:.2f} mN. After {length:.1f} µm of sliding since the jump the overshoot has fallen to one e-th.
+    Back at the old speed the force returns to {last:.2f} mN and never falls below.""",
     kind="time",
 )
 def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
