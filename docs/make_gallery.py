@@ -1011,10 +1011,11 @@ def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
     "thin_film",
     "How much more tension does a soft contact bear if the rubber is a thin film on glass?",
     """The sliding contact with a film of {thin:g} µm bears {pull:.2f} mN, {times:.1f} times as much as with one of
-    {thick:g} mm, whose base is too far away to matter. Without sliding, the film bears {still:.2f} mN, and the thick
-    one {jkr:.2f} mN as in JKR theory. The film gains twice: it is stiffer, and the glass holds the long waves of the
-    shear stress, so that sliding takes {share:.0f} % of the adhesion instead of {most:.0f} %. Broken bonds take
-    {bonds:.0f} % in both cases, and the fluctuations the rest.""",
+    {thick:g} mm, whose base is too far away to matter. Without sliding, the film bears {still:.2f} mN, and the
+    thick one {jkr:.2f} mN as in JKR theory. The film gains twice: it cannot flow aside under the sphere, and
+    the glass holds the long waves of the shear stress, so that sliding takes {share:.0f} % of the work of
+    adhesion instead of {most:.0f} %. Broken bonds take {bonds:.0f} % in both cases, and the fluctuations the
+    rest.""",
 )
 def thin_film(dataset: xr.Dataset) -> dict[str, Number]:
     pull, thickness = -1e3 * dataset["lowest_load"], dataset["solid_thickness"]
