@@ -8,9 +8,10 @@ import itertools
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,12 @@ from pydantic import (
     BeforeValidator,
     Discriminator,
     Field,
+    ModelWrapValidatorHandler,
     Tag,
     ValidationInfo,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import ArgsKwargs, PydanticCustomError
 
 from sim.units.errors import BadInput
 from sim.units.instrument import Instrument, same_line_ends
@@ -425,6 +427,27 @@ def file_columns(
         return columns(file_text(name, context), wanted, header)
 
 
+class FromFile:
+    """Base of tables of a scenario whose file gives some of their keys."""
+
+    def read_keys(self, context: Any) -> Mapping[str, Any]:
+        """Return the keys that the file gives, none if the table has them; ``context`` is that of the validation."""
+        raise NotImplementedError
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _with_file(
+        cls, keys: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo
+    ) -> Self:
+        table = handler(keys)
+        if not (of_file := table.read_keys(info.context)):
+            return table
+        if isinstance(keys, ArgsKwargs):  # of a call of the class in Python
+            names = (field.name for field in fields(table))  # type: ignore[arg-type]
+            keys = dict(zip(names, keys.args, strict=False)) | (keys.kwargs or {})
+        return handler({**keys, **of_file})
+
+
 # Courses: a value prescribed over the time of a run as a number, a course from one value to another, or a table.
 
 
@@ -706,7 +729,7 @@ class Rows:
 
 
 @keyed(kw_only=True)
-class Table(Rows):
+class Table(FromFile, Rows):
     """Values tabulated over time, linear between the rows; two rows at one time are a jump.
 
     In a scenario file ``file`` names a CSV with the columns ``time`` and ``column``, each with its unit in brackets.
@@ -725,16 +748,15 @@ class Table(Rows):
         ),
     ] = ""
 
+    def read_keys(self, context: Any) -> dict[str, Array]:
+        if self.time or not self.file:
+            return {}
+        wanted = {"time": _TIME, self.column: self.quantity}
+        read = file_columns(self.file, context, wanted)
+        return {"time": read["time"], self.values_in: read[self.column]}
+
     @model_validator(mode="after")
-    def _rows_in_order(self, info: ValidationInfo) -> "Table":
-        if self.file and not self.time:
-            read = file_columns(
-                self.file, info.context, {"time": _TIME, self.column: self.quantity}
-            )
-            columns_read = {"time": read["time"], self.values_in: read[self.column]}
-            vars(self).update(
-                {name: tuple(_listed(values)) for name, values in columns_read.items()}
-            )
+    def _rows_in_order(self) -> "Table":
         if len(self.time) != len(self.extremes):
             raise PydanticCustomError(
                 "short_table", "a table needs as many values as times"
