@@ -247,15 +247,17 @@ def write_starter(name: Path) -> Path:
     return target
 
 
-def write_schema(path: Path, root: type) -> bool:
-    """Write the JSON schema of scenario files to a path; return False if another file is there, which stays."""
+def write_schema(path: Path, root: type) -> None:
+    """Write the JSON schema of scenario files to a path, if there is no other file."""
     text = json.dumps(json_schema(root), indent=2) + "\n"
     try:
         with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
-        return path.read_bytes() == text.encode()
-    return True
+        if path.read_bytes() != text.encode():
+            stays = f"{path} is another file and stays"
+            cure = "`sim schema` prints the schema of this version"
+            raise OutputExists(f"{stays}; {cure}") from None
 
 
 def json_schema(root: type) -> dict[str, Any]:

@@ -604,6 +604,10 @@ class Measured(RowsFromFile):
     rms: Rescaled | None = None
     model: Literal["measured"] = "measured"
 
+    @property
+    def rms_of_map(self) -> float:  # type: ignore[override]
+        return math.sqrt(self.variance) if self.rms is None else math.nan
+
     def read_file(self, context: Any) -> dict[str, Any]:
         """Return the spacing and the rows of the estimate from the maps of the file."""
         map_file = read_map(self.file, context, self.variable, unit=self.unit)

@@ -549,13 +549,17 @@ class Number(NamedTuple):
     """A constant value.
 
     Every prescribed value has ``changes``, true if it depends on time, and ``cycles``, the number of cycles. ``end``
-    [s] is the last time for which it is given. Its methods are those below.
+    [s] is the last time for which it is given. ``ways`` are the times of its ways there and back [s], none if it is no
+    loop. ``lasts`` is the time of all its holds or of its loop [s], minus infinity without them. Its methods are those
+    below.
     """
 
     value: float
     changes: bool = False
     cycles: int = 0
     end: float = math.inf
+    ways: tuple[float, ...] = ()
+    lasts: float = -math.inf
 
     @property
     def extremes(self) -> tuple[float, ...]:
@@ -594,6 +598,8 @@ class Course:
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
     end: ClassVar[float] = math.inf
+    ways: ClassVar[tuple[float, ...]] = ()
+    lasts: ClassVar[float] = -math.inf
 
     @model_validator(mode="after")
     def _log_needs_one_sign(self) -> "Course":
@@ -696,6 +702,8 @@ class Rows:
 
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
+    ways: ClassVar[tuple[float, ...]] = ()
+    lasts: ClassVar[float] = -math.inf
 
     @property
     def _rows(self) -> tuple[Array, Array]:
@@ -819,7 +827,7 @@ class Holds(Rows):
         )
 
     @property
-    def lasts(self) -> float:
+    def lasts(self) -> float:  # type: ignore[override]
         """Time from the start until the slider has slid after the last hold as after the others [s]."""
         return float(self._rows[0][-1])
 
@@ -847,7 +855,7 @@ class Loop(Rows):
         return self
 
     @property
-    def ways(self) -> tuple[float, float]:
+    def ways(self) -> tuple[float, float]:  # type: ignore[override]
         """Times of the way there and of that back [s]."""
         way = abs(self.stop - self.start)
         return way / self.approach, way / self.retraction
@@ -858,7 +866,7 @@ class Loop(Rows):
         return np.array(times), np.array([self.start, self.stop, self.start])
 
     @property
-    def lasts(self) -> float:
+    def lasts(self) -> float:  # type: ignore[override]
         """Time from the start to the end of the way back [s]."""
         return float(self._rows[0][-1])
 
