@@ -916,15 +916,16 @@ def explore(
 @click.argument("name", default="first.toml", type=_PATH)
 def new(name: Path) -> None:
     """Write a starter scenario with comments, and the schema by which an editor completes its keys."""
+    from sim.numerics.files import OutputExists
     from sim.scenario.scenario import Scenario
     from sim.scenario.schema import write_schema, write_starter
 
     target = write_starter(name)
     say(f"{target}: run it with `sim run {target}`")
-    if not write_schema(schema := target.with_name("sim.schema.json"), Scenario):
-        note(
-            f"note: {schema} is another file and stays; `sim schema` prints the schema of this version"
-        )
+    try:
+        write_schema(target.with_name("sim.schema.json"), Scenario)
+    except OutputExists as fault:
+        note(f"note: {fault}")
 
 
 @cli.command()

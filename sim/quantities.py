@@ -106,7 +106,7 @@ FEELS_STEPS = Condition(
 )
 CAN_OPEN = Condition(
     "a load, indentation or displacement below zero",
-    lambda scene: min(scene.contact.course.extremes) < 0.0,
+    lambda scene: scene.contact.can_open,
 )
 CAN_JUMP_IN = Condition(
     f'{CAN_OPEN.words}, and contact.model other than "rate_dependent"',
@@ -1237,13 +1237,6 @@ QUANTITIES = {
 }
 #: Names of the quantities among which ``record.quantities`` chooses.
 RECORDED = tuple(row.name for row in (*RECORDS, *EVENTS))
-
-
-def form_of(name: str, unit: str) -> Form:
-    """Return the form of a quantity; a number without a unit at a loss of area is a share of it."""
-    if name in QUANTITIES:
-        return QUANTITIES[name].form
-    return Form.PERCENT if unit == "1" else Form.PLAIN
 
 
 def has_mean(name: str) -> bool:

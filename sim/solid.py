@@ -47,6 +47,11 @@ class ElasticSolid(Protocol):
         """This solid at a shear modulus of 1 Pa, for results that many moduli share."""
 
     @property
+    def under_circle(self) -> "ElasticSolid":
+        """This solid under a sphere with the profile of a circle, if that is known."""
+        return self
+
+    @property
     def contact_modulus(self) -> float:
         """E* of the normal contact with a sphere [Pa]."""
 
@@ -178,6 +183,10 @@ class HalfSpace(ElasticSolid):
         if coupling is None:
             coupling = halfspace.coupling(1.0, self.poisson_ratio)
         return halfspace.held_ratio(self.poisson_ratio, coupling)
+
+    @property
+    def under_circle(self) -> "UnderCircle":
+        return UnderCircle(self.shear_modulus, self.poisson_ratio)
 
     @property
     def unit(self) -> "HalfSpace":

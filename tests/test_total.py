@@ -254,7 +254,7 @@ def check_steps(seed, scenario, course):
     size = max(1, 96 // scenario.clock.steps)
     if (
         scenario.population.model in ("counted", "tracked")
-        or scenario.fluctuations.per_member
+        or scenario.fluctuations.is_random
     ):
         runs = np.array(
             [refined(seed, size * parts, 32).mean(axis=1) for parts in (0.5, 1, 2, 8)]

@@ -39,6 +39,7 @@ from sim.scenario.messages import in_plain_words
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.scenario.sweep import Axis, written
+from sim.units.quantity import Quantity
 
 #: Options of netCDF for each ``record.compression``. Six digits are within 5e-7: 20 bits and the leading one, rounded
 #: to nearest, so that flags stay flags and equal numbers stay equal.
@@ -53,6 +54,14 @@ SPEED = "speed"
 #: Statistics of the members' means over the second half of the run, and of their drift: of the last quarter less that
 #: over the third. They are recorded if the members are not.
 LATE = ("mean", "sem", "drift", "drift_sem")
+
+
+class About(NamedTuple):
+    """Unit, meaning and symbol of a variable that is neither a key of a scenario nor in the registry."""
+
+    unit: str
+    meaning: str
+    symbol: str = ""
 
 
 class Described(NamedTuple):
@@ -111,16 +120,19 @@ class Outline:
         name: str,
         kind: Any,
         dimensions: tuple[str, ...],
-        unit: str,
-        long_name: str,
-        symbol: str = "",
+        about: About | Quantity | registry.Definition,
         values: Any = None,
         chunks: tuple[int, ...] | None = None,
         compression: str = "zlib",
         **more: Any,
     ) -> None:
         """Add a variable; without ``values`` the parts hold them."""
-        attributes = {"units": unit, "long_name": long_name, "symbol": symbol} | more
+        words = {
+            "units": about.unit,
+            "long_name": about.meaning,
+            "symbol": about.symbol,
+        }
+        attributes = words | more
         attributes = {
             key: value
             for key, value in attributes.items()
@@ -141,13 +153,17 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
         _add_sweep_coordinates(content, plan, axis, math.prod(shape[place + 1 :]))
     if plan.per_member and any(map(plan.varies, plan.variables)):
         content.sizes["member"] = plan.members
-        described = "1", "number of the ensemble member", "", np.arange(plan.members)
+        about, numbers = (
+            About("1", "number of the ensemble member"),
+            np.arange(plan.members),
+        )
         content.add(
-            "member", "i4", ("member",), *described, standard_name="realization"
+            "member", "i4", ("member",), about, numbers, standard_name="realization"
         )
     clock = plan.points[0].clock
     content.sizes["t"] = clock.records
-    content.add("t", "f8", ("t",), "s", "time since the start", "t", clock.times)
+    about = About("s", "time since the start", "t")
+    content.add("t", "f8", ("t",), about, clock.times)
     _add_numbers(content, plan)
     slips = [variable.name for variable in plan.largest if variable.axis == "slip"]
     content.sizes |= {"slip": 1} if slips else {}
@@ -185,15 +201,8 @@ def outline(plan: Plan, parts: Blocks) -> Outline:
                 )
     if slips:
         numbers = np.arange(1, content.sizes["slip"] + 1)
-        content.add(
-            "slip",
-            "i4",
-            ("slip",),
-            "1",
-            "number of the slip event of a member",
-            "",
-            numbers,
-        )
+        about = About("1", "number of the slip event of a member")
+        content.add("slip", "i4", ("slip",), about, numbers)
     return content
 
 
@@ -214,14 +223,8 @@ def _add_sweep_coordinates(
     points = [quantities(plan.points[i * stride]) for i in range(len(axis.values))]
     for position, key in enumerate(axis.keys):
         if all(key in numbers for numbers in points):
-            quantity = points[0][key][0]
-            described = (
-                quantity.unit,
-                quantity.meaning,
-                quantity.symbol,
-                [numbers[key][1] for numbers in points],
-            )
-            content.add(variable_name(key), "f8", along, *described)
+            values = [numbers[key][1] for numbers in points]
+            content.add(variable_name(key), "f8", along, points[0][key][0], values)
         else:
             labels = [_label(key, row[position]) for row in axis.values]
             names = [
@@ -238,9 +241,8 @@ def _add_sweep_coordinates(
                 if _is_course(value)
             ]
             words = ", ".join(filter(None, [f"swept {key}", "; ".join(meanings)]))
-            content.add(
-                variable_name(key), str, along, "", words, "", np.array(names, object)
-            )
+            listed = np.array(names, object)
+            content.add(variable_name(key), str, along, About("", words), listed)
             contacts = [
                 plan.points[i * stride].contact for i in range(len(axis.values))
             ]
@@ -249,13 +251,9 @@ def _add_sweep_coordinates(
                     _last_rate(contact.course, plan.points[0].clock.duration)
                     for contact in contacts
                 ]
-                unit, text = (
-                    "N/s" if contacts[0].kind == "load" else "m/s",
-                    f"rate of the last change of {key}",
-                )
-                content.add(
-                    f"{variable_name(key)}_rate", "f8", along, unit, text, "", rates
-                )
+                unit = "N/s" if contacts[0].kind == "load" else "m/s"
+                about = About(unit, f"rate of the last change of {key}")
+                content.add(f"{variable_name(key)}_rate", "f8", along, about, rates)
 
 
 def _last_rate(course: Any, duration: float) -> float:
@@ -396,11 +394,9 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
         if key not in swept and all(
             key in numbers and numbers[key][1] == value for numbers in points
         ):
-            described = quantity.unit, quantity.meaning, quantity.symbol, value
-            content.add(variable_name(key), "f8", (), *described)
-    described_as = {
-        row.name: (row.unit, row.meaning, row.symbol)
-        for row in (*registry.NUMBERS, *registry.ERRORS)
+            content.add(variable_name(key), "f8", (), quantity, value)
+    described_as: dict[str, Quantity | registry.Definition] = {
+        row.name: row for row in (*registry.NUMBERS, *registry.ERRORS)
     }
     derived: dict[str, list[float]] = {}
     errors = []
@@ -412,11 +408,7 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
             if number.applies(point)
         }
         for key, (quantity, value) in point.derived.items():
-            described_as[variable_name(key)] = (
-                quantity.unit,
-                quantity.meaning,
-                quantity.symbol,
-            )
+            described_as[variable_name(key)] = quantity
             numbers[variable_name(key)] = value
         numbers |= steady_speeds(point)
         for name, value in (numbers | errors[-1][1]).items():
@@ -425,7 +417,7 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
     for name, values in derived.items():
         if name in described_as and len(values) == len(plan.points):
             array = np.reshape(values, tuple(content.sweep.values()))
-            content.add(name, "f8", tuple(content.sweep), *described_as[name], array)
+            content.add(name, "f8", tuple(content.sweep), described_as[name], array)
     if (most := worst(errors)) and "cell_error_area" in content.variables:
         content.variables["cell_error_area"].attributes["cure"] = cure(*most)
 
@@ -466,21 +458,10 @@ def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
             "flag_meanings": _FLAGS,
         }
     described = recorded.definition
-    content.add(
-        name,
-        kind,
-        dimensions,
-        described.unit,
-        described.meaning,
-        described.symbol,
-        None,
-        chunks,
-        compression,
-        **more,
-    )
+    content.add(name, kind, dimensions, described, None, chunks, compression, **more)
     if pooled and whole:
-        about = "1", f"number of members with a {described.meaning}"
-        content.add(f"{name}_count", "f8", dimensions[1:], *about)
+        about = About("1", f"number of members with a {described.meaning}")
+        content.add(f"{name}_count", "f8", dimensions[1:], about)
     return Place(pooled, each, not whole, recorded.axis)
 
 
@@ -489,34 +470,27 @@ def _add_statistics(content: Outline) -> None:
     names = registry.STATISTICS
     content.sizes["statistic"] = len(names)
     values = np.array(names, object)
-    content.add("statistic", str, ("statistic",), "", "statistic", "", values)
+    content.add("statistic", str, ("statistic",), About("", "statistic"), values)
 
 
 def _add_late(content: Outline, recorded: Variable) -> None:
     """Add statistics of the members' means over the second half of the run."""
     content.sizes["late"] = len(LATE)
     text = "statistic of the members' means over the second half of the run, and of their drift"
-    content.add("late", str, ("late",), "", text, "", np.array(LATE, object))
-    about = (
+    content.add("late", str, ("late",), About("", text), np.array(LATE, object))
+    about = About(
         recorded.definition.unit,
         f"over the second half of the run: {recorded.definition.meaning}",
         recorded.definition.symbol,
     )
-    content.add(f"late_{recorded.name}", "f8", (*content.sweep, "late"), *about)
+    content.add(f"late_{recorded.name}", "f8", (*content.sweep, "late"), about)
 
 
 def _add_phases(content: Outline, plan: Plan) -> None:
     """Add the phases of each point: start, end and name."""
     content.sizes["phase"] = plan.phases
-    content.add(
-        "phase",
-        "i4",
-        ("phase",),
-        "1",
-        "number of the phase",
-        "",
-        np.arange(1, plan.phases + 1),
-    )
+    about, numbers = About("1", "number of the phase"), np.arange(1, plan.phases + 1)
+    content.add("phase", "i4", ("phase",), about, numbers)
     shape, dims = (*content.sweep.values(), plan.phases), (*content.sweep, "phase")
     starts, ends = np.full((2, len(plan.points), plan.phases), np.nan)
     names = np.full(starts.shape, "", object)
@@ -524,33 +498,12 @@ def _add_phases(content: Outline, plan: Plan) -> None:
         count = len(point.phases.starts)
         starts[k, :count], names[k, :count] = point.phases.starts, point.phases.names
         ends[k, :count] = [*point.phases.starts[1:], point.clock.duration]
-    content.add(
-        "phase_start",
-        "f8",
-        dims,
-        "s",
-        "time at which a phase begins",
-        "",
-        starts.reshape(shape),
-    )
-    content.add(
-        "phase_end",
-        "f8",
-        dims,
-        "s",
-        "time at which a phase ends",
-        "",
-        ends.reshape(shape),
-    )
-    content.add(
-        "phase_name",
-        str,
-        dims,
-        "",
-        "course of drive and contact in a phase",
-        "",
-        names.reshape(shape),
-    )
+    about = About("s", "time at which a phase begins")
+    content.add("phase_start", "f8", dims, about, starts.reshape(shape))
+    about = About("s", "time at which a phase ends")
+    content.add("phase_end", "f8", dims, about, ends.reshape(shape))
+    about = About("", "course of drive and contact in a phase")
+    content.add("phase_name", str, dims, about, names.reshape(shape))
 
 
 def _add_maps(content: Outline, plan: Plan) -> None:
@@ -560,39 +513,17 @@ def _add_maps(content: Outline, plan: Plan) -> None:
     count = min(scene.record.map_members, plan.members)
     sizes = dict(zip("xy", lattice.shape, strict=True))
     content.sizes |= {"map_member": count, "map_time": len(scene.record.maps)} | sizes
-    content.add(
-        "map_member",
-        "i4",
-        ("map_member",),
-        "1",
-        "member of a map",
-        "",
-        np.arange(count),
-    )
-    content.add(
-        "map_time",
-        "f8",
-        ("map_time",),
-        "s",
-        "time of a map",
-        "t",
-        sorted(scene.record.maps),
-    )
+    about, members = About("1", "member of a map"), np.arange(count)
+    content.add("map_member", "i4", ("map_member",), about, members)
+    about, times = About("s", "time of a map", "t"), sorted(scene.record.maps)
+    content.add("map_time", "f8", ("map_time",), about, times)
     for axis, text, side in zip("xy", ("along", "across"), lattice.sides, strict=True):
         positions = np.arange(sizes[axis]) * (side / sizes[axis])
-        content.add(
-            axis,
-            "f8",
-            (axis,),
-            "m",
-            f"position {text} the sliding direction",
-            axis,
-            positions,
-        )
+        about = About("m", f"position {text} the sliding direction", axis)
+        content.add(axis, "f8", (axis,), about, positions)
     names = (*content.sweep, "map_member", "map_time", "x", "y")
     shape = (1,) * (len(names) - 2) + lattice.shape
-    described = registry.MAP.unit, registry.MAP.meaning, registry.MAP.symbol
-    content.add(registry.MAP.name, "f8", names, *described, None, shape)
+    content.add(registry.MAP.name, "f8", names, registry.MAP, None, shape)
     content.places[registry.MAP.name] = Place()
 
 

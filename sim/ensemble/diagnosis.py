@@ -260,7 +260,7 @@ def _masked(plan: Plan, courses: Courses, examined: Sequence[int]) -> Iterator[s
         return
     along_run = [courses[place].masked_time for place in masked]
     varies = any(len(courses[place].masked) > 1 for place in masked)
-    noise = any(plan.points[place].population.per_member for place in masked)
+    noise = any(plan.points[place].population.is_random for place in masked)
     text = f"masked for {'about ' * varies}{_percents(along_run)} of the time in steady sliding"
     text += ", without the noise of the bonds" * noise
     text += f" {points_in_words(plan, masked, examined)}".rstrip()
@@ -377,7 +377,8 @@ def _sensitive(plan: Plan, point: Scenario) -> Iterator[str]:
     ]
     if words:
         at = in_words(plan, point, speed)
-        fluctuates = point.fluctuations_move_contact
+        shear = point.fluctuations
+        fluctuates = shear.random_variance * shear.paid_by_adhesion > 0.0
         of_mean = " and the mean ΔΓ" * fluctuates
         yield f"area/friction change (%) for 1 % more of a key, at {at}{of_mean}: {', '.join(words)}"
 
@@ -452,7 +453,7 @@ def _lagging(plan: Plan, point: Scenario) -> Iterator[str]:
     with feedback, which is slow. Nothing is said of a table with a jump or beside a changing load.
     """
     left_out = (
-        point.population.per_member
+        point.population.is_random
         or point.fluctuations.law.relaxing
         or point.stepper.longest == 1
     )

@@ -420,7 +420,7 @@ def seconds_a_step(point: Scenario, members: int) -> float:
         + point.process.pairs * point.fluctuations.pair_seconds
         + point.contact.edge_seconds
     )
-    if bonds.per_member and not bonds.feeds_back:
+    if bonds.is_random:
         event = _DRIVEN_EVENT if point.drive.solves_motion else _EVENT
         member += _COUNTED + event * bonds.followed(point.speeds(21), point.clock.step)
     return batch + members * member

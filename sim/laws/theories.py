@@ -138,40 +138,43 @@ def _widest(y, level, force, mixity, which, control):
 
 
 @law
-def _radius(
-    jkr,
-    hertz,
-    level,
-    work,
-    tangential_force,
-    mixity,
-    which,
-    control,
-    sphere_radius,
-    modulus,
-    poisson_ratio,
-):
-    """Contact radius at a load or an indentation from those of JKR and Hertz."""
+def _unit(work, sphere_radius, modulus):
+    """Maugis' unit of the radius; nan or not positive without adhesion."""
+    return cube_root(0.75 * math.pi * work * sphere_radius * (sphere_radius / modulus))
+
+
+@law
+def _in_units(force, work, sphere_radius, poisson_ratio=0.5):
+    """A force in Maugis' unit; of a tangential one that with the same energy at nu = 1/2."""
+    scale = math.pi * work * sphere_radius
+    return force / scale * math.sqrt(compressible(poisson_ratio))
+
+
+@law
+def _depth_in_units(indentation, unit, sphere_radius):
+    """An indentation in Maugis' unit."""
+    return indentation / unit * (sphere_radius / unit)
+
+
+@law
+def _radius(jkr, hertz, held, force, mixity, which, control, unit):
+    """Contact radius at a load or an indentation from those of JKR and Hertz; ``held`` and ``force`` are in units."""
     if not 0.0 <= mixity <= 1.0:
         return math.nan
     if (
-        tangential_force == 0.0
+        force == 0.0
         or mixity == 0.0
-        or work <= 0.0
+        or not unit > 0.0
         or not jkr > 0.0
         or jkr == math.inf
     ):
         return jkr
-    unit = cube_root(0.75 * math.pi * work * sphere_radius * (sphere_radius / modulus))
-    scale = math.pi * work * sphere_radius
-    force = abs(tangential_force) / scale * math.sqrt(compressible(poisson_ratio))
-    held = level / scale if control == _LOAD else level / unit * (sphere_radius / unit)
     # F >= y^2: a state of JKR's radius or more
-    start = 2.0 * math.sqrt(jkr / unit) * (jkr / unit) / force
+    start = 2.0 * math.sqrt(jkr / unit) * (jkr / unit) / abs(force)
     if start > _NO_FORCE:
         return jkr
-    radius = unit * cube_root(_widest(start, held, force, mixity, which, control))
-    if not level >= 0.0:
+    radius = unit * cube_root(_widest(start, held, abs(force), mixity, which, control))
+    if not held >= 0.0:
         return radius
     return radius if radius > hertz else hertz
 
@@ -179,17 +182,11 @@ def _radius(
 def _mixed_at_load(
     which, load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio
 ):
-    held = _at_load(load, work, sphere_radius, modulus)
-    return _radius(
-        *held,
-        tangential_force,
-        mixity,
-        which,
-        _LOAD,
-        sphere_radius,
-        modulus,
-        poisson_ratio,
-    )
+    jkr, hertz, *_ = _at_load(load, work, sphere_radius, modulus)
+    held = _in_units(load, work, sphere_radius)
+    force = _in_units(tangential_force, work, sphere_radius, poisson_ratio)
+    unit = _unit(work, sphere_radius, modulus)
+    return _radius(jkr, hertz, held, force, mixity, which, _LOAD, unit)
 
 
 def _mixed_at_depth(
@@ -202,17 +199,11 @@ def _mixed_at_depth(
     modulus,
     poisson_ratio,
 ):
-    held = _at_indentation(indentation, work, sphere_radius, modulus)
-    return _radius(
-        *held,
-        tangential_force,
-        mixity,
-        which,
-        _INDENTATION,
-        sphere_radius,
-        modulus,
-        poisson_ratio,
-    )
+    jkr, hertz, *_ = _at_indentation(indentation, work, sphere_radius, modulus)
+    unit = _unit(work, sphere_radius, modulus)
+    held = _depth_in_units(indentation, unit, sphere_radius)
+    force = _in_units(tangential_force, work, sphere_radius, poisson_ratio)
+    return _radius(jkr, hertz, held, force, mixity, which, _INDENTATION, unit)
 
 
 def scaled_angle_at_load(
@@ -394,28 +385,30 @@ def _largest_force(load, work, sphere_radius, share):
 
 
 @law
-def _stuck_at_load(
-    jkr,
-    hertz,
-    load,
-    work,
-    tangential_force,
-    share,
-    sphere_radius,
-    modulus,
-    poisson_ratio,
-):
-    """Contact radius at a load from those of JKR and Hertz, with ``share`` T^2 in the energy balance."""
-    if tangential_force == 0.0 or work <= 0.0 or math.isnan(jkr):
-        return jkr
+def _stuck_load(load, work, tangential_force, share, sphere_radius, poisson_ratio):
+    """Load at which Hertz's contact is as wide as that with ``share`` T^2 in the energy balance at a load."""
+    pull = 0.0 if work <= 0.0 else twice_pull_off(work, sphere_radius)
+    if pull == 0.0:
+        return load
+    if tangential_force == 0.0:
+        return load + pull + math.sqrt(pull) * math.sqrt(2.0 * load + pull)
     share *= compressible(poisson_ratio)
     limit = _largest_force(load, work, sphere_radius, share)
     force = abs(tangential_force)
     if force > limit:
-        return hertz if load >= 0.0 else math.nan
-    pull = twice_pull_off(work, sphere_radius)
+        return load if load >= 0.0 else math.nan
     rest = math.sqrt(share) * math.sqrt(limit - force) * math.sqrt(limit + force)
-    return cube_root(0.75 * (sphere_radius / modulus) * (load + pull + rest))
+    return load + pull + rest
+
+
+def _stuck_at_load(
+    load, work, tangential_force, share, sphere_radius, modulus, poisson_ratio
+):
+    """Contact radius at a load, with ``share`` T^2 in the energy balance."""
+    equal = _stuck_load(
+        load, work, tangential_force, share, sphere_radius, poisson_ratio
+    )
+    return jkr.hertz_radius_at_load(equal, sphere_radius, modulus)
 
 
 @device
@@ -513,9 +506,8 @@ def savkoor_briggs_at_load(
     >>> print("%.3e %.3e %.3e" % tuple(a))
     1.203e-04 1.039e-04 9.787e-05
     """
-    held = _at_load(load, work, sphere_radius, modulus)
     return _stuck_at_load(
-        *held, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio
+        load, work, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio
     )
 
 
@@ -621,9 +613,8 @@ def reversible_force_at_load(
     >>> print(f"{reversible_force_at_load(5.0, 1.0, math.pi * 1.62492**2, 1.0, 4.0):.4f}")
     1.6249
     """
-    held = _at_load(load, work, sphere_radius, modulus)
     return _stuck_at_load(
-        *held, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio
+        load, work, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio
     )
 
 

@@ -39,10 +39,12 @@ class _Sliding(Part):
     """Motion as a given function of time; a subclass gives ``pieces``."""
 
     state_class: ClassVar[type[Slider]] = Slider
-    per_member: ClassVar[bool] = False
+    #: True if the motion follows from the friction and is solved together with the bonds.
     solves_motion: ClassVar[bool] = False
-    at_once: ClassVar[bool] = False
-    contact_stiffness: ClassVar[str] = "rigid"
+
+    def faults(self, is_stretched: bool, is_reversible: bool) -> dict[str, str]:
+        """Return faults of this drive, as ``_Driven.faults``: none, as it does not feel the friction."""
+        return {}
 
     def begin(self, times: Times, members: int) -> tuple[Slider, Motion]:
         motion = self.motion(0, 0.0, 0.0, times.duration)
@@ -189,11 +191,8 @@ class Table(tables.Table, _Sliding):
     model: Literal["table"] = "table"
 
 
-def _too_few_holds(course: object, after: float, setting: Setting) -> list[str]:
-    """Return a remark if a run ends before the slider has slid after the last hold of a course."""
-    if not isinstance(course, tables.Holds):
-        return []
-    lasts = after + course.lasts
+def _too_few_holds(lasts: float, setting: Setting) -> list[str]:
+    """Return a remark if a run ends before the time at which the slider has slid after the last hold [s]."""
     if setting.times.duration >= lasts * (1.0 - 1e-9):
         return []
     return [
@@ -213,7 +212,7 @@ class Holds(tables.Holds, _Sliding):
     model: Literal["holds"] = "holds"
 
     def remarks(self, setting: Setting) -> list[str]:
-        return _too_few_holds(self, 0.0, setting)
+        return _too_few_holds(self.lasts, setting)
 
 
 _Tolerance = Annotated[
@@ -303,7 +302,6 @@ class _Driven(Part):
     """Keys and attributes of a drive that feels the friction."""
 
     state_class: ClassVar[type[Driven]] = Driven
-    per_member: ClassVar[bool] = True
     solves_motion: ClassVar[bool] = True
 
     mass: Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)] = 0.0
@@ -327,13 +325,37 @@ class _Driven(Part):
 
     #: Stiffness of the spring [N/m]; 0 where the force is prescribed.
     spring: ClassVar[float] = 0.0
-    #: True if the spring has no force while the stage holds.
-    unloads: ClassVar[bool] = False
+
+    def faults(self, is_stretched: bool, is_reversible: bool) -> dict[str, str]:
+        """Return faults of this drive by key of the scenario.
+
+        ``is_stretched`` is true with bonds that have a stretch, ``is_reversible`` in a contact whose adhesion pays for
+        the mean stress.
+        """
+        faults = {}
+        if not is_stretched and self.contact_stiffness != "rigid":
+            fault = "bonds without a stretch allow no slip between interface and body"
+            faults["drive.contact_stiffness"] = (
+                f'{fault}: take "rigid", or bonds with a rupture'
+            )
+        if self.mass + self.damping + self.viscosity > 0.0:
+            return faults
+        if not is_stretched:
+            fault = "the slip speed of bonds without a stretch is not determined"
+            faults["drive"] = (
+                f"{fault}: give drive.damping, mass or viscosity, or bonds with a rupture"
+            )
+        if is_reversible:
+            fault = "lets friction drop with the contact at once"
+            faults["contact.reversible"] = (
+                f"{fault}: give drive.mass, damping or viscosity"
+            )
+        return faults
 
     @property
-    def at_once(self) -> bool:
-        """True if nothing delays the slider: neither mass, damping nor viscosity."""
-        return self.mass + self.damping + self.viscosity == 0.0
+    def in_holds(self) -> "_Driven":
+        """Drive of the body while the stage holds."""
+        return self
 
     @property
     def course(self) -> tables.Prescribed:
@@ -476,18 +498,14 @@ class Spring(_Driven):
         return self.start_after + self.course.end
 
     def remarks(self, setting: Setting) -> list[str]:
-        return _too_few_holds(self.stage, self.start_after, setting)
-
-    @property
-    def unloads(self) -> bool:  # type: ignore[override]
-        """True if the spring has no force while the stage holds."""
-        return (
-            isinstance(self.stage, StageHolds) and self.stage.while_held == "unloaded"
-        )
+        return _too_few_holds(self.start_after + self.course.lasts, setting)
 
     @cached_property
-    def relaxed(self) -> Force:
-        """Drive of the same body without a spring: its limit K -> 0 at no force."""
+    def in_holds(self) -> _Driven:  # type: ignore[override]
+        """This drive, or if the stage then relaxes the spring, its limit K -> 0 at no force."""
+        stage = self.stage
+        if not isinstance(stage, StageHolds) or stage.while_held == "rest":
+            return self
         kept = {each.name: getattr(self, each.name) for each in fields(_Driven)}
         return Force(force=0.0, **kept)
 

@@ -158,34 +158,26 @@ class Draws(NamedTuple):
         Seed, part, members and number of the first step, as of ``Noise.at``.
     """
 
-    values: Array
-    energy: Array
-    shapes: Array
-    half_weight: Array
-    factors: Array
-    by_slip: bool
-    span: float
-    mean: float
-    relaxing: bool
-    answers: bool
-    address: tuple[np.uint64, np.uint64, NDArray[np.uint64], int]
+    values: Array = np.empty((0, 0))
+    energy: Array = np.empty((0, 0))
+    shapes: Array = _EMPTY
+    half_weight: Array = _EMPTY
+    factors: Array = _EMPTY
+    by_slip: bool = True
+    span: float = 1.0
+    mean: float = 0.0
+    relaxing: bool = False
+    answers: bool = False
+    address: tuple[np.uint64, np.uint64, NDArray[np.uint64], int] = (
+        np.uint64(0),
+        np.uint64(0),
+        np.empty(0, np.uint64),
+        0,
+    )
 
 
-_NO_ADDRESS = np.uint64(0), np.uint64(0), np.empty(0, np.uint64), 0
 #: Draws where the loop of a drive draws nothing.
-NO_DRAWS = Draws(
-    np.empty((0, 0)),
-    np.empty((0, 0)),
-    _EMPTY,
-    _EMPTY,
-    _EMPTY,
-    True,
-    1.0,
-    0.0,
-    False,
-    False,
-    _NO_ADDRESS,
-)
+NO_DRAWS = Draws()
 
 
 class FieldCourse(NamedTuple):
@@ -425,10 +417,6 @@ Terms = TypeVar("Terms", contravariant=True)
 class Part(Protocol):
     """Attributes that every part of a scene declares."""
 
-    @property
-    def per_member(self) -> bool:
-        """True if members differ by this part: a matter of its model and keys, never of data."""
-
     def remarks(self, setting: Setting) -> list[str]:
         """Return sentences on what this part assumes or cannot hold in such a scene, for ``sim check``."""
         return []
@@ -436,10 +424,6 @@ class Part(Protocol):
 
 class Drive(Part, Protocol[State]):
     """Motion of the slider."""
-
-    @property
-    def solves_motion(self) -> bool:
-        """True if the motion follows from the friction and is solved together with the bonds."""
 
     @property
     def state_class(self) -> type[State]:
@@ -460,13 +444,6 @@ class Drive(Part, Protocol[State]):
 
 class Bonds(Part, Protocol[State]):
     """A population of bonds between slider and half-space."""
-
-    @property
-    def feeds_back(self) -> bool:
-        """True if a step needs the contact at the end of the step before.
-
-        If no part of a scene feeds back, each part is advanced over a whole block of steps before the next one.
-        """
 
     @property
     def state_class(self) -> type[State]:

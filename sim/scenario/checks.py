@@ -1,9 +1,9 @@
 """Conditions that hold between the parts of a scenario."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -11,11 +11,9 @@ from pydantic_core import PydanticCustomError
 
 from sim.laws.layer_table import WIDEST
 from sim.laws.limits import DISTANCES, JKR_FROM, elastocapillary_length, tabor_number
-from sim.parts.bonds.models import Cohort, Tracked
+from sim.parts.bonds.models import Demands
 from sim.parts.exchange import Array
-from sim.spectrum.families import Measured
 from sim.units.notation import engineering
-from sim.units.tables import Loop
 
 _STEPS_A_CYCLE = 2
 #: Times between which the slip of a run is looked at.
@@ -52,11 +50,11 @@ def faults_across(scene: Scene, built: bool = True) -> Faults:
         return
     for check in (
         _too_short,
-        _cannot_be_driven,
+        _unlike_drive,
         _unknown_on_a_layer,
         _unknown_of_a_circle,
         _unlike_contact,
-        _lacks_bonds,
+        _unlike_bonds,
         _catch_is_too_weak,
         _unlike_temperature,
         _implausible,
@@ -81,7 +79,7 @@ def _too_short(scene: Scene) -> Faults:
             ("contact", contact.kind, "cycles"),
             f"{fault}; make fewer cycles or shorter steps",
         )
-    elif isinstance(contact.course, Loop) and min(contact.course.ways) < clock.step:
+    elif any(way < clock.step for way in contact.course.ways):
         fault = f"one way of the loop takes {min(contact.course.ways):.3g} s, less than a clock step"
         cure = "lower its approach or retraction, or clock.step"
         yield ("contact", contact.kind), f"{fault}; {cure}"
@@ -96,26 +94,14 @@ def _unlike_contact(scene: Scene) -> Faults:
     yield from ((("contact", key), fault) for key, fault in faults.items())
 
 
-def _cannot_be_driven(scene: Scene) -> Faults:
-    drive, bonds = scene.drive, scene.population
-    if drive.solves_motion and not bonds.stretched:
-        if drive.contact_stiffness != "rigid":
-            fault = "bonds without a stretch allow no slip between interface and body"
-            yield (
-                ("drive", "contact_stiffness"),
-                f'{fault}: take "rigid", or bonds with a rupture',
-            )
-        if drive.at_once:
-            fault = "the slip speed of bonds without a stretch is not determined"
-            yield (
-                ("drive",),
-                f"{fault}: give drive.damping, mass or viscosity, or bonds with a rupture",
-            )
-        if not bonds.carries_stress:
-            yield (
-                ("bonds", "stress"),
-                "is 0 Pa, so there is no friction; give the stress of the bonds",
-            )
+def _by_place(faults: Mapping[str, str]) -> Faults:
+    """Yield faults that have dotted keys of a scenario."""
+    yield from ((tuple(key.split(".")), fault) for key, fault in faults.items())
+
+
+def _unlike_drive(scene: Scene) -> Faults:
+    is_reversible = scene.contact.reversible > 0.0
+    yield from _by_place(scene.drive.faults(scene.population.stretched, is_reversible))
 
 
 def _unknown_on_a_layer(scene: Scene) -> Faults:
@@ -147,29 +133,13 @@ def _no_circle(scene: Scene) -> str:
     return ""
 
 
-def _lacks_bonds(scene: Scene) -> Faults:
-    shear, bonds = scene.fluctuations, scene.population
-    if bonds.stretched and bonds.rebinding_rate == 0.0 and bonds.start_from != "bonded":
-        yield (
-            ("bonds", "start"),
-            'no site binds without rebinding: give "bonded", or a rebinding_rate above 0',
-        )
-    if not shear.spectrum.bond_made:
-        if shear.reads_stress and not bonds.carries_stress:
-            fault = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
-            yield ("shear", "amplitude"), fault
-    elif not bonds.knows_forces:
-        fault = 'the spectrum of the bonds needs the force of each bond; use bonds.model = "cohort" or "tracked"'
-        yield ("shear", "spectrum"), fault
-    else:
-        # a bond's own stiffness is in series with that of the solid, which stores ½ f²/k under a force f
-        stiffest = 0.5 / scene.elastic.stored_energy(shear.spectrum)
-        if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
-            fault = f"the solid under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
-            yield (
-                ("bonds", "bond_stiffness"),
-                f"{fault}: give at most that, or a larger shear.spectrum.footprint",
-            )
+def _unlike_bonds(scene: Scene) -> Faults:
+    spectrum, stiffest = scene.fluctuations.spectrum, None
+    if spectrum.bond_made:
+        stiffest = 0.5 / scene.elastic.stored_energy(spectrum)
+    reads_stress = scene.fluctuations.amplitude.reads_stress
+    demands = Demands(scene.drive.solves_motion, reads_stress, stiffest)
+    yield from _by_place(scene.population.faults(demands))
 
 
 def _catch_is_too_weak(scene: Scene) -> Faults:
@@ -186,17 +156,11 @@ def _catch_is_too_weak(scene: Scene) -> Faults:
 
 def _unlike_temperature(scene: Scene) -> Faults:
     if scene.temperature is not None:
-        faults = scene.temperature.faults(scene.numbers)
-        yield from ((tuple(key.split(".")), fault) for key, fault in faults.items())
+        yield from _by_place(scene.temperature.faults(scene.numbers))
 
 
 def _implausible(scene: Scene) -> Faults:
-    drive, contact, radius, size = (
-        scene.drive,
-        scene.contact,
-        scene.rest_radius,
-        scene.sphere.radius,
-    )
+    contact, radius, size = scene.contact, scene.rest_radius, scene.sphere.radius
     if contact.lags and not scene.adhesion.work > 0.0:
         fault = "a rate-dependent edge needs a work of adhesion at rest; give adhesion.work above zero"
         yield ("adhesion", "work"), fault
@@ -207,14 +171,11 @@ def _implausible(scene: Scene) -> Faults:
             ("contact", contact.kind),
             f"{fault} check its unit, and those of sphere, adhesion and solid",
         )
-    if drive.solves_motion and contact.reversible > 0.0 and drive.at_once:
-        fault = "lets friction drop with the contact at once: give drive.mass, damping or viscosity"
-        yield ("contact", "reversible"), fault
 
 
 def _wrong_maps(scene: Scene) -> Faults:
     record, clock, members = scene.record, scene.clock, scene.ensemble.members
-    if record.maps and not scene.fluctuations.draws_maps:
+    if record.maps and scene.fluctuations.model != "mapped":
         yield (
             ("record", "maps"),
             'needs shear.model = "mapped"; choose it or omit the maps',
@@ -388,7 +349,8 @@ def remarks_between(scene: Scene) -> list[str]:
         remarks.append(
             f'sphere.radius is {radius:g} m: a number without a unit is in metres, write "5 mm"'
         )
-    if scene.fluctuations_move_contact and bonds.feeds_back and not contact.lags:
+    moves_contact = shear.random_variance * shear.paid_by_adhesion > 0.0
+    if moves_contact and bonds.feeds_back and not contact.lags:
         remarks.append(
             'carried area does not converge in a fluctuating contact: use model = "rate_dependent"'
         )
@@ -416,19 +378,8 @@ def remarks_between(scene: Scene) -> list[str]:
 
 def _remark_on_unit(shear: Any, strength: float) -> list[str]:
     """Return a remark if the stress of a measured map is nearer to a thousand times that of the bonds, or less."""
-    if shear.measured:
-        key, size, text = (
-            "field",
-            max(abs(shear.field.mean), shear.field.rms),
-            f"mean {shear.field.mean:.3g} Pa, ",
-        )
-        text += f"rms {shear.field.rms:.3g} Pa"
-    elif isinstance(shear.spectrum, Measured) and shear.spectrum.rms is None:
-        key, size = "spectrum", math.sqrt(shear.spectrum.variance)
-        text = f"rms {size:.3g} Pa"
-    else:
-        return []
-    if strength == 0.0 or abs(math.log10(size / strength)) < _FAR:
+    key, size, text = shear.mapped
+    if not size * strength > 0.0 or abs(math.log10(size / strength)) < _FAR:
         return []
     return [
         f"the map ({text}) is {size / strength:.2g} times the stress of the bonds, {strength:.3g} Pa: is"
@@ -441,11 +392,6 @@ _OVERSHOOT = 0.5826
 #: Share of the variance of ΔΓ that a step may renew: a contact under tension lets go late by a tenth of the scatter of
 #: ΔΓ, and the variance of the radius of a lagging edge is 1 % too large.
 _RENEWED_LATE, _RENEWED_LAGGING = 0.005 / _OVERSHOOT**2, -math.expm1(-math.sqrt(0.12))
-
-
-def pulled(scene: Scene) -> bool:
-    """Return True if the control draws the sphere away at some time."""
-    return bool(min(scene.contact.course.extremes) < 0.0)
 
 
 def renewed(scene: Scene, path: Array) -> Array:
@@ -504,15 +450,15 @@ def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
     if scene.feels_steps:
         gone = -math.log1p(-min(renewed(scene, path)[0], 0.999))
         share = -math.log1p(
-            -(_RENEWED_LATE if pulled(scene) else _RENEWED_LAGGING)
+            -(_RENEWED_LATE if scene.contact.can_open else _RENEWED_LAGGING)
         ) / max(gone, 1e-300)
         lost = 0.5 * gone / math.tanh(0.5 * gone) - 1.0 if gone else 0.0
         error = f"the variance of its radius is up to {lost:.1%} too large"
-        if pulled(scene):
+        if scene.contact.can_open:
             error = f"the error of its pull-off load is up to {engineering(pull_off_error(scene, path)[0], 'N')}"
         part = f"a step renews {-math.expm1(-gone):.1%} of its variance"
         text = f"ΔΓ acts on the contact only at clock steps, and {part}: {error}"
-    elif scene.fluctuations.passes and (scene.contact.lags or pulled(scene)):
+    elif scene.fluctuations.passes and (scene.contact.lags or scene.contact.can_open):
         share = scene.fluctuations.field.pixels[0] / max(slid, 1e-300)
         text = f"a clock step slides {engineering(slid, 'm')}, more than a pixel of the map: the contact skips pixels"
     else:

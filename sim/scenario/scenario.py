@@ -32,7 +32,7 @@ from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
 from sim.parts.temperature import Temperature
 from sim.quantities import RECORDED
-from sim.scenario.checks import Limits, faults_across, limits, pulled, remarks_between
+from sim.scenario.checks import Limits, faults_across, limits, remarks_between
 from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.schema import changed, entries, quantities, with_models
@@ -585,12 +585,15 @@ class Scenario:
 
         Without a random part these values are equal.
         """
-        driven = self.drive.per_member
-        bonded = driven or self.population.per_member
-        by_bonds = bonded and (
-            self.fluctuations.reads_stress or self.fluctuations.passes
+        driven, bonds, field = (
+            self.drive.solves_motion,
+            self.population,
+            self.fluctuations,
         )
-        sheared = driven or self.fluctuations.per_member or by_bonds
+        bonded = driven or bonds.is_random or bonds.feeds_back
+        reads_bonds = field.amplitude.reads_stress or field.spectrum.bond_made
+        by_bonds = bonded and (reads_bonds or field.passes)
+        sheared = driven or field.is_random or by_bonds
         return {
             "drive": driven,
             "bonds": bonded,
@@ -602,13 +605,13 @@ class Scenario:
     @property
     def is_random(self) -> bool:
         """Return True if a part of the scene is random. Members differ only then."""
-        return self.population.is_random or self.fluctuations.per_member
+        return self.population.is_random or self.fluctuations.is_random
 
     @property
     def lags_behind_speed(self) -> bool:
         """Return True if the speed changes at a constant mount, and bonds or fluctuations lag behind it."""
         rates = (key.startswith("bonds.rebinding") for key in quantities(self))
-        lags = any(rates) or self.fluctuations.relaxes
+        lags = any(rates) or self.fluctuations.amplitude.relaxing
         return lags and not self.contact.changes and bool(np.ptp(self.speeds(_SPEEDS)))
 
     @property
@@ -628,10 +631,8 @@ class Scenario:
     @cached_property
     def feels_steps(self) -> bool:
         """Return True if what ΔΓ does between clock steps matters: to an edge that lags, or to a pull-off."""
-        varies = (
-            self.fluctuations.per_member and self.fluctuations.spectrum.variance > 0.0
-        )
-        return varies and (self.contact.lags or pulled(self))
+        varies = self.fluctuations.random_variance > 0.0
+        return varies and (self.contact.lags or self.contact.can_open)
 
     @property
     def knows_energy(self) -> bool:
@@ -640,25 +641,10 @@ class Scenario:
         The amplitude is then that of the moment, which all members share.
         """
         shear, law = self.fluctuations, self.fluctuations.law
-        if not shear.per_member or shear.measured or shear.spectrum.bond_made:
+        if not shear.is_random or shear.spectrum.bond_made:
             return False
         feels = self.drive.solves_motion or law.relaxing or law.remembers
         return not (feels or (law.reads_stress and self.varies["bonds"]))
-
-    @property
-    def fluctuations_move_contact(self) -> bool:
-        """Return True if random fluctuations change the area of the contact."""
-        shear = self.fluctuations
-        return (
-            shear.per_member
-            and shear.spectrum.variance > 0.0
-            and not self.fluctuations_leave_contact
-        )
-
-    @property
-    def fluctuations_leave_contact(self) -> bool:
-        """Return True if fluctuations never change the contact."""
-        return self.fluctuations.paid_by_adhesion == 0.0 or self.fluctuations.stays
 
     def remarks(self) -> list[str]:
         """Return one sentence for each assumption, error of the cell and implausible value."""

@@ -2,7 +2,7 @@
 
 import functools
 import json
-from collections.abc import Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, cast, get_args
 from pydantic import Tag, TypeAdapter
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
+from pydantic_core import SchemaValidator, core_schema
 
 from sim.numerics.files import OutputExists
 from sim.units.quantity import Quantity
@@ -192,25 +193,29 @@ def quantities(part: Any) -> dict[str, tuple[Quantity, float]]:
 
 def changed(part: Any, values: Mapping[str, Any]) -> Any:
     """Return a scenario or a part with some numbers changed within their bounds; unchecked, because this is quick."""
-    names, aliases = _names(cast(Hashable, type(part)))
-    result = object.__new__(type(part))
-    result.__dict__.update({name: getattr(part, name) for name in names})
+    build, names, aliases = _unchecked(cast(Hashable, type(part)))
+    document = {name: getattr(part, name) for name in names}
     for key, value in values.items():
         first, _, rest = key.partition(".")
         name = aliases.get(first, first)
-        result.__dict__[name] = (
-            changed(getattr(result, name), {rest: value}) if rest else value
-        )
-    return result
+        document[name] = changed(document[name], {rest: value}) if rest else value
+    return build(document)
 
 
 @functools.cache
-def _names(table: Any) -> tuple[list[str], dict[str, str]]:
-    """Return the names of a table's values, and those by the key of a file if the key differs."""
+def _unchecked(
+    table: Any,
+) -> tuple[Callable[[dict[str, Any]], Any], list[str], dict[str, str]]:
+    """Return a function that makes a table of any values, their names, and those by the key of a file if it differs."""
+    names = [item.name for item in fields(table)]
+    anything = [
+        core_schema.dataclass_field(name, core_schema.any_schema()) for name in names
+    ]
+    values = core_schema.dataclass_args_schema(table.__name__, anything)
+    schema = core_schema.dataclass_schema(table, values, names)
     declared = getattr(table, "__pydantic_fields__", {})
-    return [item.name for item in fields(table)], {
-        item.alias: name for name, item in declared.items() if item.alias
-    }
+    aliases = {item.alias: name for name, item in declared.items() if item.alias}
+    return SchemaValidator(schema).validate_python, names, aliases
 
 
 def declaration(declared: Any) -> Quantity | None:
@@ -242,15 +247,17 @@ def write_starter(name: Path) -> Path:
     return target
 
 
-def write_schema(path: Path, root: type) -> bool:
-    """Write the JSON schema of scenario files to a path; return False if another file is there, which stays."""
+def write_schema(path: Path, root: type) -> None:
+    """Write the JSON schema of scenario files to a path, if there is no other file."""
     text = json.dumps(json_schema(root), indent=2) + "\n"
     try:
         with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
-        return path.read_bytes() == text.encode()
-    return True
+        if path.read_bytes() != text.encode():
+            stays = f"{path} is another file and stays"
+            cure = "`sim schema` prints the schema of this version"
+            raise OutputExists(f"{stays}; {cure}") from None
 
 
 def json_schema(root: type) -> dict[str, Any]:

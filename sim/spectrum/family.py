@@ -49,6 +49,8 @@ class Family(Stress, Protocol):
     wavevector: ClassVar[tuple[float, float] | None] = None
     #: True if bonds make the field: C is then that of n <f²> = 1 N²/m², and the bonds set its size.
     bond_made: ClassVar[bool] = False
+    #: Root mean square of the map of which it is the spectrum [Pa]; nan if there is none, or another one is given.
+    rms_of_map: ClassVar[float] = math.nan
     #: Sentences on what is assumed of the spectrum, for ``sim check``.
     remarks: ClassVar[tuple[str, ...]] = ()
     #: Wavenumbers [rad/m] between which the density may differ from zero.

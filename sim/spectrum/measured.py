@@ -9,17 +9,10 @@ import functools
 import hashlib
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import (
-    AfterValidator,
-    Field,
-    PlainSerializer,
-    Strict,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import AfterValidator, Field, PlainSerializer, Strict, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
@@ -29,7 +22,15 @@ from sim.numerics.grid import Lattice, lattice_of
 from sim.spectrum.family import Array, Weight
 from sim.spectrum.radial import PowerLaws, Rowed, Rows
 from sim.units.quantity import Quantity, keyed
-from sim.units.tables import LISTED, blamed, file_columns, file_path, file_text, matrix
+from sim.units.tables import (
+    LISTED,
+    FromFile,
+    blamed,
+    file_columns,
+    file_path,
+    file_text,
+    matrix,
+)
 
 _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
 _HEIGHTS = 'it is a spectrum of heights; give a density of stress over the plane, in "Pa^2 m^2"'
@@ -59,7 +60,7 @@ _NEAR = 0.05
 _FLAT, _PART = 0.5, 0.01
 
 
-class FromFile(Rowed, Protocol):
+class RowsFromFile(FromFile, Rowed):
     """Base of spectra whose rows may be read from a file."""
 
     file: str
@@ -67,23 +68,24 @@ class FromFile(Rowed, Protocol):
     densities: Densities
     rms: Rescaled | None
 
-    def read_file(self, context: Any) -> tuple[Array, Array]:
+    def read_file(self, context: Any) -> dict[str, Any]:
         """Return the wavenumbers and densities of the file; ``context`` is that of the validation."""
+        raise NotImplementedError
 
     @property
     def normalization(self) -> str:
         """Place of the 4π², a key of ``NORMALIZATIONS``."""
         return "in_integral"
 
+    def read_keys(self, context: Any) -> dict[str, Any]:
+        if self.wavenumbers or self.densities:
+            return {}
+        with blamed(self.file):
+            return self.read_file(context)
+
     @model_validator(mode="after")
-    def _check(self, info: ValidationInfo) -> Self:
-        """Read the file if no rows are given; refuse rows that are no spectrum."""
-        if not (self.wavenumbers or self.densities):
-            with blamed(self.file):
-                q, density = self.read_file(info.context)
-            vars(self).update(
-                wavenumbers=tuple(q.tolist()), densities=tuple(density.tolist())
-            )
+    def _check(self) -> Self:
+        """Refuse rows that are no spectrum."""
         rows, steps = (
             (len(self.wavenumbers), len(self.densities)),
             np.diff(self.wavenumbers),
@@ -133,7 +135,7 @@ class FromFile(Rowed, Protocol):
 
 
 @keyed()
-class Tabulated(FromFile):
+class Tabulated(RowsFromFile):
     """A radial density given by rows: power laws between them, zero outside.
 
     Parameters
@@ -180,7 +182,7 @@ class Tabulated(FromFile):
     rms: Rescaled | None = None
     model: Literal["tabulated"] = "tabulated"
 
-    def read_file(self, context: Any) -> tuple[Array, Array]:
+    def read_file(self, context: Any) -> dict[str, Any]:
         """Return the columns q and C of the file."""
         if not self.file:
             raise PydanticCustomError(
@@ -191,7 +193,7 @@ class Tabulated(FromFile):
         table = file_columns(
             self.file, context, {"q": _WAVENUMBER, "C": _DENSITY}, self.header
         )
-        return table["q"], table["C"]
+        return {"wavenumbers": table["q"], "densities": table["C"]}
 
     @model_validator(mode="after")
     def _no_gaps(self) -> Self:
@@ -551,7 +553,7 @@ def radial_average(density: Array, grid: Lattice) -> RadialAverage:
 
 
 @keyed()
-class Measured(FromFile):
+class Measured(RowsFromFile):
     """The radially averaged spectrum of measured stress maps, used as a table.
 
     Parameters
@@ -602,19 +604,23 @@ class Measured(FromFile):
     rms: Rescaled | None = None
     model: Literal["measured"] = "measured"
 
-    def read_file(self, context: Any) -> tuple[Array, Array]:
-        """Return the rows of the estimate from the maps of the file."""
+    @property
+    def rms_of_map(self) -> float:  # type: ignore[override]
+        return math.sqrt(self.variance) if self.rms is None else math.nan
+
+    def read_file(self, context: Any) -> dict[str, Any]:
+        """Return the spacing and the rows of the estimate from the maps of the file."""
         map_file = read_map(self.file, context, self.variable, unit=self.unit)
         along, across = spacings_of(map_file, self.spacing, None, "spacing")
         if not math.isclose(along, across, rel_tol=1e-4):
             raise ValueError(
                 "x and y are not spaced by one step; interpolate the map onto a square lattice"
             )
-        vars(self).update(spacing=along)
         maps = map_file.values.reshape(-1, *map_file.values.shape[-2:])
-        return estimate(
+        q, density = estimate(
             maps, (maps.shape[1] * along, maps.shape[2] * along), self.window
         )
+        return {"spacing": along, "wavenumbers": q, "densities": density}
 
 
 def estimate(
@@ -659,7 +665,7 @@ _Shape = Annotated[tuple[int, int], SkipJsonSchema()]
 
 
 @keyed()
-class StressMap:
+class StressMap(FromFile):
     """A measured map of the shear stress itself, with its phases and directions.
 
     Parameters
@@ -720,10 +726,7 @@ class StressMap:
     shape: _Shape = (0, 0)
 
     @model_validator(mode="after")
-    def _goes_together(self, info: ValidationInfo) -> Self:
-        if not self.values:
-            with blamed(self.file):
-                self._read_file(info.context)
+    def _goes_together(self) -> Self:
         if self.mask and self.window != "none":
             message = (
                 "a window would taper the stress inside the contact; omit it with mask"
@@ -737,7 +740,13 @@ class StressMap:
             )
         return self
 
-    def _read_file(self, context: Any) -> None:
+    def read_keys(self, context: Any) -> dict[str, Any]:
+        if self.values:
+            return {}
+        with blamed(self.file):
+            return self._read_file(context)
+
+    def _read_file(self, context: Any) -> dict[str, Any]:
         map_file = read_map(
             self.file, context, self.variable, gaps=True, unit=self.unit
         )
@@ -753,9 +762,12 @@ class StressMap:
                 "the stress is uniform, so there are no fluctuations; check the file"
             )
         pixel, pixel_y = spacings_of(map_file, self.pixel, self.pixel_y, "pixel")
-        vars(self).update(
-            pixel=pixel, pixel_y=pixel_y, values=values.tobytes(), shape=values.shape
-        )
+        return {
+            "pixel": pixel,
+            "pixel_y": pixel_y,
+            "values": values.tobytes(),
+            "shape": values.shape,
+        }
 
     @property
     def pixels(self) -> tuple[float, float]:

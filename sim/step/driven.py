@@ -22,7 +22,6 @@ from sim.parts.exchange import (
     Sliding,
     Storing,
 )
-from sim.parts.shear.models import Model as FluctuationModel
 from sim.spectrum.radial import PLANE
 from sim.step.state import MemberNoise, State, Trajectory
 from sim.step.stepper import BLOCK_NUMBERS, Scene, Stepper
@@ -49,7 +48,7 @@ class Driven(Stepper):
     def __init__(self, scene: Scene, longest: int = BLOCK_NUMBERS) -> None:
         super().__init__(scene, longest)
         contact, work = scene.models.contact, scene.work.adhesion.work_of_bonds
-        self.is_undisturbed = is_undisturbed(scene.models.fluctuations)
+        self.is_undisturbed = scene.models.fluctuations.stays
         self.holds_contact = contact.lags or not (
             contact.changes or contact.reversible or work(1.0) != work(0.0)
         )
@@ -76,12 +75,9 @@ class Driven(Stepper):
         scene = self.scene
         drive, _, process, _ = parts = scene.parts
         slider = cast(Slider, state.drive)
-        if is_unloaded := self._is_unloaded(steps):
-            spring = cast(Spring, drive)
-            parts, slider = (
-                parts._replace(drive=cast(Drive[Sliding], spring.relaxed)),
-                spring.unloaded(slider),
-            )
+        if is_unloaded := (moved_by := self._moved_by(steps)) is not drive:
+            parts = parts._replace(drive=moved_by)
+            slider = cast(Spring, drive).unloaded(slider)
         around = self._around(state.contact, state.shear, steps)
         ends = self._ends(state, noise, steps)
         reached = coupled.advance(
@@ -120,12 +116,14 @@ class Driven(Stepper):
             motions.time, motions, bonding, energy, readings, touch
         )
 
-    def _is_unloaded(self, steps: range) -> bool:
-        """Return True if a block lies in a hold in which the stage has relaxed the spring."""
+    def _moved_by(self, steps: range) -> Drive[Sliding]:
+        """Return the drive of the body in a block, which may be another one while the stage holds."""
         drive, phases = self.scene.parts.drive, self.scene.phases
-        if not cast(Force | Spring, drive).unloads:
-            return False
-        return phases.rests[bisect.bisect_right(phases.steps, steps.start) - 1]
+        in_holds = cast(Drive[Sliding], cast(Force | Spring, drive).in_holds)
+        if in_holds is drive:
+            return drive
+        holds = phases.rests[bisect.bisect_right(phases.steps, steps.start) - 1]
+        return in_holds if holds else drive
 
     def _touch(
         self, before: ContactState, motions: Motion, balance: Balance, ends: StepEnds
@@ -234,16 +232,10 @@ def _held(before: Storing, after: Storing, energy: Array) -> tuple[Storing, Arra
     return after.holding(held[-1]), held[1:]
 
 
-def is_undisturbed(fluctuations: FluctuationModel) -> bool:
-    """Return True if fluctuations never change the contact."""
-    return fluctuations.paid_by_adhesion == 0.0 or fluctuations.stays
-
-
 def driven(scene: Scene) -> Driven:
     """Return the stepper of a driven slider: the loop over the clock steps, or single steps."""
     fluctuations, bonds, contact = scene.models
-    draws = is_undisturbed(fluctuations) or fluctuations.in_blocks
+    draws = fluctuations.stays or fluctuations.in_blocks
     if contact.lags or not (bonds.in_blocks and draws):
         return SingleSteps(scene)
-    alone = bonds.feeds_back or fluctuations.feeds_back
-    return Driven(scene, longest=1 if alone else BLOCK_NUMBERS)
+    return Driven(scene, longest=1 if bonds.feeds_back else BLOCK_NUMBERS)

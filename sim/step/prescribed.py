@@ -14,7 +14,7 @@ class Prescribed(Stepper):
 
     def __init__(self, scene: Scene) -> None:
         fluctuations, bonds, _ = scene.models
-        alone = bonds.feeds_back or fluctuations.feeds_back
+        alone = bonds.feeds_back or fluctuations.passes
         super().__init__(scene, 1 if alone else BLOCK_NUMBERS)
 
     def start(self, noise: MemberNoise) -> State:

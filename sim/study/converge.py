@@ -632,7 +632,7 @@ def _compare(rows: list[Setting], samples: dict[Setting, Array]) -> None:
     part = cast(Any, finest.scenario.fluctuations)
     has_truth = (
         finest.part == "shear"
-        and part.per_member
+        and part.is_random
         and not (part.law.relaxing or finest.scenario.drive.solves_motion)
     )
     for row in rows:
@@ -671,7 +671,7 @@ class _Replayed:
 def _replays(scenario: Scenario) -> bool:
     """True if coarser steps can have the fluctuations of a finer run: the fluctuations do not depend on other parts."""
     part, driven = scenario.fluctuations, scenario.drive.solves_motion
-    return part.per_member and not (
+    return part.is_random and not (
         driven or part.law.relaxing or part.law.remembers or part.spectrum.bond_made
     )
 

@@ -248,7 +248,7 @@ def others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     still = dict.fromkeys({"shear.paid_by_adhesion"} & {*quantities(scene)}, 0.0)
     share = {"adhesion.bond_share": 0.0}
     shares = scene.adhesion.bond_share, scene.fluctuations.paid_by_adhesion
-    is_stressed = scene.population.carries_stress
+    is_stressed = scene.population.steady(np.ones(1)).strength[0] > 0.0
     if is_stressed and still and min(shares) > 0.0:
         yield "bonds only", _less(problem, still, "shear.")
         yield "fluctuations only", _less(problem, share, "adhesion.bond_share")

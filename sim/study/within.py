@@ -373,7 +373,7 @@ class Search:
         in time that their means have not.
         """
         return all(
-            (point.knows_energy or not point.fluctuations.per_member)
+            (point.knows_energy or not point.fluctuations.is_random)
             and not (
                 point.drive.solves_motion or point.contact.lags or point.feels_steps
             )
@@ -611,7 +611,7 @@ def _random(scenario: Scenario) -> frozenset[str]:
     """Return those of shear and bonds in which members differ at some point of the sweep."""
     points = scenario.points()
     flags = {
-        "shear": any(point.fluctuations.per_member for point in points),
+        "shear": any(point.fluctuations.is_random for point in points),
         "bonds": any(point.population.is_random for point in points),
     }
     return frozenset(part for part, is_random in flags.items() if is_random)

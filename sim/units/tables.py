@@ -8,9 +8,10 @@ import itertools
 import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,12 @@ from pydantic import (
     BeforeValidator,
     Discriminator,
     Field,
+    ModelWrapValidatorHandler,
     Tag,
     ValidationInfo,
     model_validator,
 )
-from pydantic_core import PydanticCustomError
+from pydantic_core import ArgsKwargs, PydanticCustomError
 
 from sim.units.errors import BadInput
 from sim.units.instrument import Instrument, same_line_ends
@@ -425,6 +427,27 @@ def file_columns(
         return columns(file_text(name, context), wanted, header)
 
 
+class FromFile:
+    """Base of tables of a scenario whose file gives some of their keys."""
+
+    def read_keys(self, context: Any) -> Mapping[str, Any]:
+        """Return the keys that the file gives, none if the table has them; ``context`` is that of the validation."""
+        raise NotImplementedError
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _with_file(
+        cls, keys: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo
+    ) -> Self:
+        table = handler(keys)
+        if not (of_file := table.read_keys(info.context)):
+            return table
+        if isinstance(keys, ArgsKwargs):  # of a call of the class in Python
+            names = (field.name for field in fields(table))  # type: ignore[arg-type]
+            keys = dict(zip(names, keys.args, strict=False)) | (keys.kwargs or {})
+        return handler({**keys, **of_file})
+
+
 # Courses: a value prescribed over the time of a run as a number, a course from one value to another, or a table.
 
 
@@ -526,13 +549,17 @@ class Number(NamedTuple):
     """A constant value.
 
     Every prescribed value has ``changes``, true if it depends on time, and ``cycles``, the number of cycles. ``end``
-    [s] is the last time for which it is given. Its methods are those below.
+    [s] is the last time for which it is given. ``ways`` are the times of its ways there and back [s], none if it is no
+    loop. ``lasts`` is the time of all its holds or of its loop [s], minus infinity without them. Its methods are those
+    below.
     """
 
     value: float
     changes: bool = False
     cycles: int = 0
     end: float = math.inf
+    ways: tuple[float, ...] = ()
+    lasts: float = -math.inf
 
     @property
     def extremes(self) -> tuple[float, ...]:
@@ -571,6 +598,8 @@ class Course:
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
     end: ClassVar[float] = math.inf
+    ways: ClassVar[tuple[float, ...]] = ()
+    lasts: ClassVar[float] = -math.inf
 
     @model_validator(mode="after")
     def _log_needs_one_sign(self) -> "Course":
@@ -673,6 +702,8 @@ class Rows:
 
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
+    ways: ClassVar[tuple[float, ...]] = ()
+    lasts: ClassVar[float] = -math.inf
 
     @property
     def _rows(self) -> tuple[Array, Array]:
@@ -706,7 +737,7 @@ class Rows:
 
 
 @keyed(kw_only=True)
-class Table(Rows):
+class Table(FromFile, Rows):
     """Values tabulated over time, linear between the rows; two rows at one time are a jump.
 
     In a scenario file ``file`` names a CSV with the columns ``time`` and ``column``, each with its unit in brackets.
@@ -725,16 +756,15 @@ class Table(Rows):
         ),
     ] = ""
 
+    def read_keys(self, context: Any) -> dict[str, Array]:
+        if self.time or not self.file:
+            return {}
+        wanted = {"time": _TIME, self.column: self.quantity}
+        read = file_columns(self.file, context, wanted)
+        return {"time": read["time"], self.values_in: read[self.column]}
+
     @model_validator(mode="after")
-    def _rows_in_order(self, info: ValidationInfo) -> "Table":
-        if self.file and not self.time:
-            read = file_columns(
-                self.file, info.context, {"time": _TIME, self.column: self.quantity}
-            )
-            columns_read = {"time": read["time"], self.values_in: read[self.column]}
-            vars(self).update(
-                {name: tuple(_listed(values)) for name, values in columns_read.items()}
-            )
+    def _rows_in_order(self) -> "Table":
         if len(self.time) != len(self.extremes):
             raise PydanticCustomError(
                 "short_table", "a table needs as many values as times"
@@ -797,7 +827,7 @@ class Holds(Rows):
         )
 
     @property
-    def lasts(self) -> float:
+    def lasts(self) -> float:  # type: ignore[override]
         """Time from the start until the slider has slid after the last hold as after the others [s]."""
         return float(self._rows[0][-1])
 
@@ -825,7 +855,7 @@ class Loop(Rows):
         return self
 
     @property
-    def ways(self) -> tuple[float, float]:
+    def ways(self) -> tuple[float, float]:  # type: ignore[override]
         """Times of the way there and of that back [s]."""
         way = abs(self.stop - self.start)
         return way / self.approach, way / self.retraction
@@ -836,7 +866,7 @@ class Loop(Rows):
         return np.array(times), np.array([self.start, self.stop, self.start])
 
     @property
-    def lasts(self) -> float:
+    def lasts(self) -> float:  # type: ignore[override]
         """Time from the start to the end of the way back [s]."""
         return float(self._rows[0][-1])
 

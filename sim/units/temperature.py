@@ -3,11 +3,11 @@
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from sim.units.quantity import Quantity, keyed
-from sim.units.tables import LISTED, file_columns
+from sim.units.tables import LISTED, FromFile, file_columns
 
 _ZERO_CELSIUS = 273.15
 _CELSIUS = ("°C", "℃", "degC", "celsius")
@@ -46,7 +46,7 @@ _ROW = absolute("temperatures of the rows", "T")
 
 
 @keyed(kw_only=True)
-class ModulusTable:
+class ModulusTable(FromFile):
     """The modulus over the temperature, linear between the rows; ``file`` names a CSV."""
 
     temperature: Annotated[tuple[Annotated[float, _ROW], ...], LISTED] = ()
@@ -58,13 +58,15 @@ class ModulusTable:
         ),
     ] = ""
 
+    def read_keys(self, context: Any) -> dict[str, np.ndarray]:
+        if self.temperature or not self.file:
+            return {}
+        wanted = {"temperature": _ROW, "modulus": _MODULUS}
+        read = file_columns(self.file, context, wanted)
+        return {"temperature": read["temperature"], "value": read["modulus"]}
+
     @model_validator(mode="after")
-    def _rows_in_order(self, info: ValidationInfo) -> "ModulusTable":
-        if self.file and not self.temperature:
-            wanted = {"temperature": _ROW, "modulus": _MODULUS}
-            read = file_columns(self.file, info.context, wanted)
-            vars(self)["temperature"] = tuple(read["temperature"].tolist())
-            vars(self)["value"] = tuple(read["modulus"].tolist())
+    def _rows_in_order(self) -> "ModulusTable":
         if len(self.temperature) != len(self.value) or len(self.value) < 2:
             message = 'needs two rows or more, each a temperature and a value; or a CSV file, file = "dma.csv"'
             raise PydanticCustomError("modulus_table", message)

@@ -211,14 +211,8 @@ def go_together(case):
     fluctuations = SHEARS[case.get("shear", "uniform")]
     if contact.faults(part.solves_motion, fluctuations.contact != "plane", False):
         return False
-    if not part.solves_motion:
-        return True
-    if contact.reversible and part.at_once:
-        return False
     population = BONDS[case.get("bonds", "rate, bell")].chosen(1e-8, False)
-    return population.stretched or (
-        part.contact_stiffness == "rigid" and not part.at_once
-    )
+    return not part.faults(population.stretched, contact.reversible > 0.0)
 
 
 def scene(members=3, steps=8, **parts):

@@ -77,6 +77,13 @@ def test_the_energy_of_a_map_is_that_of_its_file(files, name):
     assert len(TypeAdapter(StressMap).dump_python(result, mode="json")["values"]) == 64
 
 
+def test_a_map_whose_arguments_go_by_position_is_that_by_their_names(files):
+    path = str(files.folder / written(files, "map.csv"))
+    by_name = StressMap(file=path, pixel=PIXEL, pixel_y=PIXEL_Y)
+    assert by_name.shape == FIELD.shape
+    assert StressMap(path, PIXEL, PIXEL_Y) == by_name
+
+
 def test_a_map_has_the_unit_of_its_file_or_of_the_key_and_axes_without_units_the_pixels_of_the_key(
     files,
 ):

@@ -181,7 +181,7 @@ def test_the_true_error_is_within_the_target():
     for name in SCENES:
         scene = sim.load(accuracy_scene(name))
         reference = _means(_finest(scene))
-        has_field = scene.fluctuations.per_member
+        has_field = scene.fluctuations.is_random
         targets = (0.05, 0.01) if name in SPRINGS and has_field else (0.05, 0.01, 0.003)
         for target in targets:
             means = _means(answer(scene, Goal(target, (), 300.0)).scenario)

@@ -69,17 +69,36 @@ def share_kept(before: Array, radius: Array) -> Array:
     )
 
 
+class Demands(NamedTuple):
+    """Demands of a scene on its bonds.
+
+    Attributes
+    ----------
+    is_driven : bool
+        True if the slider feels the friction.
+    reads_stress : bool
+        True if the amplitude of the fluctuations follows the stress.
+    stiffest : float, optional
+        Stiffness of the solid under a bond [N/m], if the bonds make the fluctuations.
+    """
+
+    is_driven: bool
+    reads_stress: bool
+    stiffest: float | None
+
+
 class _BondModel(Part):
     """Attributes of all bond models; those with a stretch have a start and a rate of rebinding."""
 
+    model: str
     start_from: str
     rebinding_rate: float
-    per_member: ClassVar[bool] = False
+    #: True if a step needs the contact at the end of the step before. Members differ as their contacts do.
     feeds_back: ClassVar[bool] = False
     #: True if bonds break by chance, one by one.
     is_random: ClassVar[bool] = False
     #: True if the population is solved through blocks of clock steps.
-    in_blocks: ClassVar[bool] = False
+    in_blocks: ClassVar[bool] = True
     #: Rough time of a single step of a batch, for estimates [s].
     step_seconds: ClassVar[float] = 0.0
     #: Count of numbers in the state of a member.
@@ -91,6 +110,14 @@ class _BondModel(Part):
         The radius is nan if the contact is open.
         """
         return np.ones(1), before
+
+    def faults(self, demands: Demands) -> dict[str, str]:
+        """Return faults of these bonds by key of the scenario."""
+        if demands.stiffest is None:
+            return {}
+        cure = 'use bonds.model = "cohort" or "tracked"'
+        fault = "the spectrum of the bonds needs the force of each bond"
+        return {"shear.spectrum": f"{fault}; {cure}"}
 
     def chosen(self, area: float, forces: bool) -> Self:
         """Return this model, for any contact ``area`` [m²] and any field, reading the bonds' ``forces`` or not."""
@@ -114,14 +141,12 @@ class _OverArea(_BondModel):
     area: Area
 
     @property
-    def per_member(self) -> bool:  # type: ignore[override]
+    def feeds_back(self) -> bool:  # type: ignore[override]
         return self.area == "carried"
-
-    feeds_back = per_member
 
     def rows(self, noise: Noise) -> Array:
         """Return ones, shape (populations,): a single population if all members share an area, else one each."""
-        return np.ones(len(noise.members) if self.per_member else 1)
+        return np.ones(len(noise.members) if self.feeds_back else 1)
 
     def diluted(self, before: Array, radius: Array) -> tuple[Array, Array]:
         """Return the share of bound sites left [1] over a contact of ``radius`` [m], and the radius of their area [m].
@@ -192,14 +217,20 @@ class _WithoutStretch(_BondModel):
 
     state_class: ClassVar[type[Population]] = Population
     stretched: ClassVar[bool] = False
-    knows_forces: ClassVar[bool] = False
     critical_speed: float
     stress: float
 
-    @property
-    def carries_stress(self) -> bool:
-        """True if there is a shear stress at all."""
-        return self.stress > 0.0
+    def faults(self, demands: Demands) -> dict[str, str]:
+        faults = super().faults(demands)
+        if demands.is_driven and not self.stress:
+            faults["bonds.stress"] = (
+                "is 0 Pa, so there is no friction; give the stress of the bonds"
+            )
+        if demands.reads_stress and not self.stress:
+            faults["shear.amplitude"] = (
+                'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
+            )
+        return faults
 
     def advance(
         self, state: Population, motions: Motion, radius: Array, noise: Noise
@@ -277,8 +308,6 @@ def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound)
 class _AtOnce(_WithoutStretch):
     """Attributes of models whose bonds are steady at every speed."""
 
-    in_blocks: ClassVar[bool] = True
-
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))
 
@@ -346,8 +375,6 @@ class Rate(_OverArea, _WithoutStretch):
     area: Area = "present"
     model: Literal["rate"] = "rate"
 
-    in_blocks: ClassVar[bool] = True
-
     def start(self, motion: Motion, noise: Noise) -> Population:
         # a drive that solves the motion has its members
         rows = self.rows(noise) + 0.0 * motion.speed
@@ -391,8 +418,8 @@ class Counted(_WithoutStretch):
     start_from: Start = "steady"
     model: Literal["counted"] = "counted"
 
-    per_member: ClassVar[bool] = True
     is_random: ClassVar[bool] = True
+    in_blocks: ClassVar[bool] = False
 
     def bonding(self, state: Population) -> Bonding:
         return super().bonding(state._replace(bound=state.bound / self.sites))
@@ -465,19 +492,15 @@ Ratio = Annotated[
     float,
     Quantity("1", "rebinding_rate over zero_force_rate", "rho", above=0, typical="10"),
 ]
-_BY_SPEED = ("rupture.critical_speed", "rupture.stress", "rebinding_ratio")
 _T = TypeVar("_T", bound="_Stretched | Auto")
 
 
 def _one_way(bonds: _T) -> _T:
     """Return bonds that have either their rates and site density, or a critical speed and a stress; refuse others."""
-    is_bell = isinstance(bonds.rupture, Bell)
-    by_rates = (
-        *(("rupture.zero_force_rate",) if is_bell else ()),
-        "rebinding_rate",
-        "site_density",
-    )
-    keys = (*by_rates, *(_BY_SPEED if is_bell else _BY_SPEED[-1:]))
+    law = cast(Rupture, bonds.rupture)
+    by_rates = (*law.rate_keys, "rebinding_rate", "site_density")
+    by_speed = (*law.speed_keys, "rebinding_ratio")
+    keys = (*by_rates, *by_speed)
     present = [key for key in keys if attrgetter(key)(bonds) is not None]
     if set(present) <= set(by_rates):
         missing = [
@@ -491,8 +514,9 @@ def _one_way(bonds: _T) -> _T:
                 for place in missing
             ]
             raise ValidationError.from_exception_data("bonds", errors)
-    elif not is_bell or {*present} != {*_BY_SPEED}:
-        ways = f"give either {', '.join(by_rates)} or, of Bell's rupture, {', '.join(_BY_SPEED)}"
+    elif not law.speed_keys or {*present} != {*by_speed}:
+        words = ", ".join((*Bell.speed_keys, "rebinding_ratio"))
+        ways = f"give either {', '.join(by_rates)} or, of Bell's rupture, {words}"
         raise PydanticCustomError("one_way", f"{ways}; given are {', '.join(present)}")
     return bonds
 
@@ -502,8 +526,6 @@ class _Stretched(_BondModel):
     """Keys and attributes of models with a stretch; a subclass gives the moments of the stretch over all sites."""
 
     stretched: ClassVar[bool] = True
-    knows_forces: ClassVar[bool] = True
-    carries_stress: ClassVar[bool] = True
 
     rupture: Rupture
     bond_stiffness: Stiffness
@@ -513,8 +535,6 @@ class _Stretched(_BondModel):
 
     #: Rates and site density of a critical speed and a stress: those of the exact density over the stretch.
     numbers_of: ClassVar = staticmethod(schallamach.bell_numbers)
-    #: Attribute of the rupture laws that the population can have; empty if it can have any.
-    needs: ClassVar[str] = ""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -523,13 +543,21 @@ class _Stretched(_BondModel):
     @model_validator(mode="after")
     def _can_have_the_law(self) -> Self:
         law = self.rupture
-        if self.needs and not getattr(law, self.needs):
-            cure = '"cohort" or "tracked"' if law.rises else '"cohort"'
+        if self.model not in law.models:
+            cure = " or ".join(f'"{model}"' for model in law.models)
             message = f'rupture model "{law.model}" needs the stretch of each bond'
             raise PydanticCustomError(
                 "unsuitable_law", f"{message}; use bonds.model = {cure}"
             )
         return self
+
+    def faults(self, demands: Demands) -> dict[str, str]:
+        faults = super().faults(demands)
+        if self.rebinding_rate == 0.0 and self.start_from != "bonded":
+            faults["bonds.start"] = (
+                'no site binds without rebinding: give "bonded", or a rebinding_rate above 0'
+            )
+        return faults
 
     def chosen(self, area: float, forces: bool) -> Self:
         """Return this model with all of its rates and its site density, for any contact and field."""
@@ -629,9 +657,6 @@ class FirstMoment(_OverArea, _Stretched):
 
     numbers_of: ClassVar = staticmethod(schallamach.first_moment_numbers)
     state_class: ClassVar[type[Stretches]] = Stretches
-    knows_forces: ClassVar[bool] = False
-    in_blocks: ClassVar[bool] = True
-    needs: ClassVar[str] = "has_first_moment"
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
         if self.start_from == "steady":
@@ -696,6 +721,23 @@ class FirstMoment(_OverArea, _Stretched):
         )
 
 
+class _OfEachBond(_Stretched):
+    """Attributes of models that know the force of each bond."""
+
+    def faults(self, demands: Demands) -> dict[str, str]:
+        stiffest, faults = (
+            demands.stiffest,
+            super().faults(demands._replace(stiffest=None)),
+        )
+        # a bond's own stiffness is in series with that of the solid, which stores ½ f²/k under a force f
+        if stiffest is not None and self.bond_stiffness > stiffest * (1.0 + 1e-9):
+            fault = f"the solid under a bond of this footprint has a stiffness of {stiffest:.3g} N/m in series"
+            faults["bonds.bond_stiffness"] = (
+                f"{fault}: give at most that, or a larger shear.spectrum.footprint"
+            )
+        return faults
+
+
 class Ages(NamedTuple):
     """State of a cohort population."""
 
@@ -704,7 +746,7 @@ class Ages(NamedTuple):
 
 
 @keyed()
-class Cohort(_OverArea, _Stretched):
+class Cohort(_OverArea, _OfEachBond):
     """The density of bonds over their stretch, as cohorts carried with the slider. Limit: tracked bonds without noise.
 
     Bonds born together stay together: their survival over a step is exact, nothing diffuses. Births
@@ -720,7 +762,6 @@ class Cohort(_OverArea, _Stretched):
 
     state_class: ClassVar[type[Ages]] = Ages
     step_seconds: ClassVar[float] = 10e-6
-    in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Ages:
         if self.start_from == "steady":
@@ -765,7 +806,7 @@ class Cohort(_OverArea, _Stretched):
 
 
 @keyed()
-class Tracked(_Stretched):
+class Tracked(_OfEachBond):
     """A finite number of sites, every bond's stretch and exact rupture time. Limit: ``Cohort`` as sites -> infinity.
 
     ``sites`` are followed for each member, whatever the area: the area scales the stress, not the number.
@@ -786,10 +827,7 @@ class Tracked(_Stretched):
     model: Literal["tracked"] = "tracked"
 
     state_class: ClassVar[type[Tracks]] = Tracks
-    per_member: ClassVar[bool] = True
     is_random: ClassVar[bool] = True
-    in_blocks: ClassVar[bool] = True
-    needs: ClassVar[str] = "rises"
 
     @property
     def numbers(self) -> int:  # type: ignore[override]
@@ -927,11 +965,12 @@ class Auto:
                 )
             return Rate(**plain, stress=self.stress, start_from=start, area=self.area)
         rest = {name: getattr(self, name) for name in _NUMBERS}
-        if noisy and number <= _MOST_TRACKED and self.rupture.rises:
+        if noisy and number <= _MOST_TRACKED and "tracked" in self.rupture.models:
             return Tracked(**rest, sites=int(number), start_from=start).chosen(
                 area, forces
             )
-        if not self.rupture.depends_on_stretch and not forces:
+        law = self.rupture.law(cast(float, self.bond_stiffness))
+        if math.isinf(law.scale) and not forces:
             return FirstMoment(**rest, start_from=start, area=self.area)
         tolerance = max(1e-12, min(1e-4, 0.1 * self.tolerance))
         return Cohort(

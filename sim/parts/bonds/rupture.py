@@ -113,12 +113,12 @@ class _Law:
 
     #: Force on which the rate changes by about e [N].
     force: float
-    #: True if the rupture depends on the stretch, by a limit or below it.
-    depends_on_stretch: ClassVar[bool] = True
-    #: True if all rupture is by one exponential, whose first moment is closed.
-    has_first_moment: ClassVar[bool] = False
-    #: True if the rate never falls with the force. The ages of tracked bonds are drawn only under such a law.
-    rises: ClassVar[bool] = True
+    #: Models of bonds that can have the law. "rate" needs a rupture by one exponential, whose first moment is closed,
+    #: "tracked" a rate that never falls with the force, because ages are drawn only under such a law.
+    models: ClassVar[tuple[str, ...]] = "cohort", "tracked"
+    #: Keys of a rate, and those that take its place if critical speed and stress of the bonds are given.
+    rate_keys: ClassVar[tuple[str, ...]] = ()
+    speed_keys: ClassVar[tuple[str, ...]] = ()
     #: Pathways of rupture as of the law ``resolved_onset``; none if force opens no pathway.
     pathways: ClassVar[tuple[tuple[float, float], ...]] = ()
 
@@ -154,8 +154,7 @@ class _Law:
 class Constant(_Law):
     """Bonds open by themselves at one rate, however stretched they are."""
 
-    depends_on_stretch: ClassVar[bool] = False
-    has_first_moment: ClassVar[bool] = True
+    models: ClassVar[tuple[str, ...]] = "rate", "cohort", "tracked"
 
     rate: Annotated[float, Quantity("1/s", "rupture rate of a bond", "k_0", above=0)]
     model: Literal["constant"] = "constant"
@@ -204,7 +203,9 @@ class Bell(_Law):
     stress: LargestStress | None = None
     model: Literal["bell"] = "bell"
 
-    has_first_moment: ClassVar[bool] = True
+    models: ClassVar[tuple[str, ...]] = "rate", "cohort", "tracked"
+    rate_keys: ClassVar[tuple[str, ...]] = ("rupture.zero_force_rate",)
+    speed_keys: ClassVar[tuple[str, ...]] = "rupture.critical_speed", "rupture.stress"
 
     @property
     def pathways(self) -> tuple[tuple[float, float], ...]:  # type: ignore[override]
@@ -250,7 +251,7 @@ class CutOff(_Law):
     ] = 0.0
     model: Literal["cut_off"] = "cut_off"
 
-    has_first_moment: ClassVar[bool] = True
+    models: ClassVar[tuple[str, ...]] = "rate", "cohort", "tracked"
 
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.rate, 0.0, self.stretch)
@@ -260,7 +261,7 @@ class CutOff(_Law):
 class Catch(_Law):
     """Force closes one pathway of rupture and opens another: k = kc exp(−f/f_c) + ks exp(f/f_s). Limit: ``Bell``."""
 
-    rises: ClassVar[bool] = False
+    models: ClassVar[tuple[str, ...]] = ("cohort",)
 
     catch_rate: Annotated[
         float,

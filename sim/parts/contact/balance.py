@@ -52,8 +52,28 @@ def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
     return bodies.solid.contact_energy(radius, indentation, bodies.sphere_radius)
 
 
+class _Holding(Protocol):
+    """Attributes of both controls."""
+
+    @property
+    def mount(self) -> Mount:
+        """Load and base that hold the sphere."""
+
+    @property
+    def closes(self) -> bool | Flags:
+        """True if a detached sphere comes back into contact."""
+
+    def touches(self, work: Array) -> bool | Flags:
+        """Return ``closes``, whatever the work of adhesion."""
+        return self.closes
+
+    def radius(self, work: Array, bodies: Bodies) -> Array:
+        """Return the radius in equilibrium [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
+        return bodies.solid.radius(self.mount, work, bodies.sphere_radius)
+
+
 @dataclass(frozen=True)
-class LoadControl:
+class LoadControl(_Holding):
     """Dead load, compression positive [N]."""
 
     load: float | Array
@@ -67,14 +87,6 @@ class LoadControl:
     def closes(self) -> bool | Flags:
         """True if a detached sphere comes back into contact, because the load is not tensile."""
         return self.load >= 0.0
-
-    def touches(self, work: Array) -> bool | Flags:
-        """Return ``closes``, whatever the work of adhesion."""
-        return self.closes
-
-    def radius(self, work: Array, bodies: Bodies) -> Array:
-        """Return the radius in equilibrium [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
-        return bodies.solid.radius(self.mount, work, bodies.sphere_radius)
 
     def normal_load(
         self, radius: Array, bodies: Bodies, work: Array | None = None
@@ -117,7 +129,7 @@ class LoadControl:
 
 
 @dataclass(frozen=True)
-class DisplacementControl:
+class DisplacementControl(_Holding):
     """Displacement of the base [m] behind a stiffness [N/m]; an infinite stiffness makes it the indentation."""
 
     base: float | Array
@@ -132,14 +144,6 @@ class DisplacementControl:
     def closes(self) -> bool | Flags:
         """True if a detached sphere comes back into contact: at a displacement of zero or more."""
         return self.base >= 0.0
-
-    def touches(self, work: Array) -> bool | Flags:
-        """Return ``closes``, whatever the work of adhesion."""
-        return self.closes
-
-    def radius(self, work: Array, bodies: Bodies) -> Array:
-        """Return the radius in equilibrium [m]: Hertz's if no work of adhesion is left, nan without an equilibrium."""
-        return bodies.solid.radius(self.mount, work, bodies.sphere_radius)
 
     def normal_load(
         self, radius: Array, bodies: Bodies, work: Array | None = None

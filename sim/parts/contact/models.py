@@ -32,10 +32,10 @@ from sim.parts.contact.balance import (
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import TURN, Array, ContactState, Flags, Motion, Setting, during
-from sim.solid import ElasticSolid, HalfSpace, Layer, UnderCircle
+from sim.solid import ElasticSolid, HalfSpace, Layer
 from sim.spectrum.radial import PLANE
 from sim.units.quantity import Quantity, keyed
-from sim.units.tables import Loop, Prescribed, over_time, prescribed
+from sim.units.tables import Prescribed, over_time, prescribed
 
 
 @keyed()
@@ -169,9 +169,7 @@ class Sphere:
 
     def on(self, solid: ElasticSolid) -> ElasticSolid:
         """Return a solid as the contact with this sphere feels it."""
-        if self.profile == "circle" and isinstance(solid, HalfSpace):
-            return UnderCircle(solid.shear_modulus, solid.poisson_ratio)
-        return solid
+        return solid.under_circle if self.profile == "circle" else solid
 
 
 @keyed()
@@ -300,8 +298,6 @@ class _Controlled:
     """A contact under a load, an indentation, or a displacement with a stiffness."""
 
     state_class: ClassVar[type[ContactState]] = ContactState
-    per_member: ClassVar[bool] = False
-    feeds_back: ClassVar[bool] = False
     #: True if the edge takes time to reach equilibrium.
     lags: ClassVar[bool] = False
     #: Theory of the equilibrium.
@@ -369,12 +365,10 @@ class _Controlled:
 
     def _cut_short(self, setting: Setting) -> list[str]:
         """Return a remark if the run ends before the way back of a loop."""
-        course = self.course
-        if not isinstance(course, Loop):
+        lasts = self.course.lasts
+        if setting.times.duration >= lasts * (1.0 - 1e-9):
             return []
-        if setting.times.duration >= course.lasts * (1.0 - 1e-9):
-            return []
-        cure = f"set clock.duration to {course.lasts:.6g} s or more"
+        cure = f"set clock.duration to {lasts:.6g} s or more"
         return [f"the run ends before the loop of contact.{self.kind} does: {cure}"]
 
     @cached_property
@@ -417,6 +411,11 @@ class _Controlled:
     def makes_load(self) -> bool:
         """True if the load follows from the contact or changes in time."""
         return self.load is None or self.changes
+
+    @property
+    def can_open(self) -> bool:
+        """True if the control draws the sphere away at some time."""
+        return min(self.course.extremes) < 0.0
 
     @property
     def changes(self) -> bool:
@@ -491,7 +490,7 @@ class _Controlled:
 
     def _phases(self, state: ContactState, control: Control, balance: Balance) -> Array:
         """Return the phases of the reference contacts at the end of each step, shape (steps, rows, 4)."""
-        if min(self.course.extremes) >= 0.0:
+        if not self.can_open:
             return during(state.phases, len(balance.bonded))
         lost = self._without_equilibrium(control, balance)
         touches = np.zeros(lost.shape, bool)

@@ -451,6 +451,20 @@ def _is_rounding(force, slider):
 
 
 @device
+def _directed(law, sense):
+    """Return the numbers of bonds without a stretch over which the slider goes in a direction."""
+    return mechanics.Law(
+        rate=law.rate,
+        softness=law.softness,
+        cuts=law.cuts,
+        binding=law.binding,
+        scale=law.scale,
+        sense=sense,
+        slows=law.slows,
+    )
+
+
+@device
 def _sticking_piece(line, slider, law, contact, nodes, books):
     """Go through one piece with bonds that bear any pull up to their strength at rest. Return the time reached."""
     start, length, row, energy = 0.0, slider.length, line[0], books[0]
@@ -473,9 +487,7 @@ def _sticking_piece(line, slider, law, contact, nodes, books):
             # whose sign may be the wrong one
             if stuck % 2 == 1 and _is_rounding(row.spring_force, slider):
                 sense = -sense
-        along = mechanics.Law(
-            law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows
-        )
+        along = _directed(law, sense)
         if rests:
             felt, at_rest = row.felt, contact
             contact = mechanics.leaving_rest(contact, row)

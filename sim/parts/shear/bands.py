@@ -520,19 +520,18 @@ class BandedProcess(Renewing):
 
     def draws(self, state: Fluctuation, steps: range, noise: Noise) -> Draws:
         law = self.correlation
-        of_bands = (
-            self.shapes,
-            self.half_weight,
-            factors(law, self.wavenumber),
-            law.by_slip,
-            law.span,
-        )
-        rules = *of_bands, self.mean, self.amplitude.relaxing, self._forgets_by_slip
         return Draws(
-            state.values.copy(),
-            during(state.past.energy, len(steps) + 1),
-            *rules,
-            noise.at(steps.start),
+            values=state.values.copy(),
+            energy=during(state.past.energy, len(steps) + 1),
+            shapes=self.shapes,
+            half_weight=self.half_weight,
+            factors=factors(law, self.wavenumber),
+            by_slip=law.by_slip,
+            span=law.span,
+            mean=self.mean,
+            relaxing=self.amplitude.relaxing,
+            answers=self._forgets_by_slip,
+            address=noise.at(steps.start),
         )
 
     def known_errors(self) -> dict[str, float]:

@@ -82,16 +82,12 @@ _margin = functools.lru_cache(maxsize=32)(Margin)
 class ShearModel:
     """Attributes of all shear models."""
 
-    per_member: ClassVar[bool] = False
-    feeds_back: ClassVar[bool] = False
-    draws_maps: ClassVar[bool] = False
+    #: True if each member has fluctuations of its own.
+    is_random: ClassVar[bool] = False
+    #: True if the process has a list of its modes.
     keeps_modes: ClassVar[bool] = False
     #: True if all members and seeds have one measured pattern.
     measured: ClassVar[bool] = False
-    #: True if the energy on a disc depends on the position of the slider.
-    passes: ClassVar[bool] = False
-    #: True if the energy that the contact reads is the same at all times.
-    stays: ClassVar[bool] = False
     #: True if a drive that solves its motion can draw the energy that the contact reads in its own loop.
     in_blocks: ClassVar[bool] = False
     #: Correlation length of the field [m]; nan if its modes have none in common.
@@ -104,11 +100,6 @@ class ShearModel:
     contact: str
     #: Relative error of the energy on a disc that needs no remark.
     tolerance: float = 0.01
-
-    @property
-    def relaxes(self) -> bool:
-        """Return True if the amplitude follows the speed with a delay."""
-        return bool(getattr(self, "amplitude", Constant()).relaxing)
 
     @model_validator(mode="after")
     def _one_size(self) -> Self:
@@ -133,9 +124,22 @@ class ShearModel:
         return self.amplitude.within(self._memory)
 
     @property
-    def reads_stress(self) -> bool:
-        """True if the size of the field follows the bonds."""
-        return self.amplitude.reads_stress or self.spectrum.bond_made
+    def passes(self) -> bool:
+        """True if the energy on a disc depends on the position of the slider, so that a step needs the one before."""
+        return self.measured and self.contact == "disc"
+
+    @property
+    def stays(self) -> bool:
+        """True if fluctuations never change the contact: they take no energy of it, or always the same."""
+        if self.paid_by_adhesion == 0.0:
+            return True
+        changes = self.amplitude.model != "constant" or self.spectrum.bond_made
+        return not (self.is_random or changes or self.contact == "disc")
+
+    @property
+    def random_variance(self) -> float:
+        """Variance of fluctuations that each member has of its own [Pa²]."""
+        return self.spectrum.variance if self.is_random else 0.0
 
     def side(self, cell: float) -> float:
         """Return the side of the periodic cell [m], by default ``cell``; infinite without a cell."""
@@ -172,6 +176,12 @@ class ShearModel:
     def details(self, setting: Setting) -> list[tuple[str, str]]:
         """Return properties of a measured pattern, each as (name, words)."""
         return []
+
+    @property
+    def mapped(self) -> tuple[str, float, str]:
+        """Key, largest stress [Pa] and statistics in words of a measured map at its own scale; nan without one."""
+        size = self.spectrum.rms_of_map
+        return "spectrum", size, f"rms {size:.3g} Pa"
 
     def remarks(self, setting: Setting) -> list[str]:
         spectrum, radius, solid = self.spectrum, setting.rest_radius, setting.solid
@@ -226,7 +236,6 @@ class Uniform(ShearModel):
     contact = "plane"
 
     model: Literal["uniform"] = "uniform"
-    stays: ClassVar[bool] = True
 
     def process(self, solid: ElasticSolid, cell: float) -> SmoothProcess:
         return SmoothProcess(0.0, Constant())
@@ -250,14 +259,6 @@ class Mean(ShearModel):
         return self
 
     @property
-    def stays(self) -> bool:  # type: ignore[override]
-        return (
-            self.amplitude.model == "constant"
-            and self.contact == "plane"
-            and not self.spectrum.bond_made
-        )
-
-    @property
     def in_blocks(self) -> bool:  # type: ignore[override]
         return self.amplitude.model in _FOLLOWED and not self.spectrum.bond_made
 
@@ -274,7 +275,9 @@ class _Fluctuating(ShearModel):
     None means the grid that holds the spectrum's shortest wavelength.
     """
 
-    per_member: ClassVar[bool] = True
+    is_random: ClassVar[bool] = True
+    #: Mode pairs that the process can list.
+    most_pairs: ClassVar[float] = math.inf
 
     spectrum: Spectrum
     correlation: Correlation
@@ -293,24 +296,6 @@ class _Fluctuating(ShearModel):
 
     def faults(self, solid: ElasticSolid, rest_radius: float) -> list[tuple[str, str]]:
         cell = self.side(math.sqrt(math.pi) * rest_radius)
-        if self.contact == "disc" and self.draws_maps and not 2.0 * rest_radius <= cell:
-            if math.isnan(rest_radius):
-                message = (
-                    "there is no contact at rest, so the size of the cell is unknown"
-                )
-                return [
-                    (
-                        "contact",
-                        f'{message}; move the sphere closer by a key of [contact], or give "plane"',
-                    )
-                ]
-            message = f"the cell of {cell:g} m is smaller than the contact: {2.0 * rest_radius:g} m wide at rest"
-            return [
-                (
-                    "cell",
-                    f'{message}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more',
-                )
-            ]
         if too_many := self.too_many_modes(cell):
             return [
                 (
@@ -336,8 +321,7 @@ class _Fluctuating(ShearModel):
             return f"the cell of {cell:g} m holds {waves:.2g} of the shortest waves along a side"
         reach = waves if self.points is None else min(waves, (self.points - 1) // 2)
         pairs = (2.0 * reach + 1.0) * (reach + 1.0)
-        listed = self.keeps_modes and (self.draws_maps or not ripple)
-        if listed and math.isfinite(reach) and pairs > _MOST_PAIRS:
+        if math.isfinite(reach) and pairs > self.most_pairs:
             return f"the cell of {cell:g} m has {pairs:.2g} Fourier modes; at most {_MOST_PAIRS:.2g} are possible"
         return ""
 
@@ -349,6 +333,11 @@ class Modal(_Fluctuating):
     model: Literal["modal"] = "modal"
 
     keeps_modes: ClassVar[bool] = True
+
+    @property
+    def most_pairs(self) -> float:  # type: ignore[override]
+        # a wave has one pair, however large its cell is
+        return math.inf if self.spectrum.wavevector else _MOST_PAIRS
 
     def process(self, solid: ElasticSolid, cell: float) -> ModalProcess:
         kind = SiteModes if self.spectrum.bond_made else ModalProcess
@@ -365,7 +354,19 @@ class Mapped(Modal):
 
     model: Literal["mapped"] = "mapped"  # type: ignore[assignment]
 
-    draws_maps: ClassVar[bool] = True
+    most_pairs: ClassVar[float] = _MOST_PAIRS
+
+    def faults(self, solid: ElasticSolid, rest_radius: float) -> list[tuple[str, str]]:
+        cell = self.side(math.sqrt(math.pi) * rest_radius)
+        if self.contact == "plane" or 2.0 * rest_radius <= cell:
+            return super().faults(solid, rest_radius)
+        if math.isnan(rest_radius):
+            fault = "there is no contact at rest, so the size of the cell is unknown"
+            cure = 'move the sphere closer by a key of [contact], or give "plane"'
+            return [("contact", f"{fault}; {cure}")]
+        fault = f"the cell of {cell:g} m is smaller than the contact: {2.0 * rest_radius:g} m wide at rest"
+        cure = f'give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more'
+        return [("cell", f"{fault}; {cure}")]
 
     def process(self, solid: ElasticSolid, cell: float) -> ModalProcess:
         process = super().process(solid, cell)
@@ -520,7 +521,6 @@ class Carried(ShearModel):
     the sphere, without an end that meets its beginning.
     """
 
-    draws_maps: ClassVar[bool] = True
     measured: ClassVar[bool] = True
 
     field: StressMap
@@ -544,18 +544,6 @@ class Carried(ShearModel):
             message = 'start is the first position of a disc: give contact = "disc", or omit start'
             raise PydanticCustomError("disc_of_map", message)
         return self
-
-    @property
-    def passes(self) -> bool:  # type: ignore[override]
-        return self.contact == "disc"
-
-    @property
-    def feeds_back(self) -> bool:  # type: ignore[override]
-        return self.passes  # the contact is found at one position at a time
-
-    @property
-    def stays(self) -> bool:  # type: ignore[override]
-        return self.amplitude.model == "constant" and not self.passes
 
     @property
     def spectrum(self) -> Measured:  # type: ignore[override]
@@ -606,6 +594,12 @@ class Carried(ShearModel):
                 f"{message}; shorten the slip to {max(length - 2.0 * radius, 0.0):.3g} m, or give a longer map",
             )
         ]
+
+    @property
+    def mapped(self) -> tuple[str, float, str]:
+        mean, rms = self.field.mean, self.field.rms
+        size = max(abs(mean), rms)
+        return "field", size, f"mean {mean:.3g} Pa, rms {rms:.3g} Pa"
 
     def details(self, setting: Setting) -> list[tuple[str, str]]:
         field, solid = self.field, setting.solid

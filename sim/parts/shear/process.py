@@ -270,13 +270,23 @@ Amplitude = Annotated[
 ]
 
 
-@keyed()
-class Time:
-    """Modes renew in time: λ = 1/time."""
+class _InTime:
+    """Attributes of correlations that fade at rest, too."""
 
     #: The rate goes with |q| to this power, and with the speed or not.
     power: ClassVar[int] = 0
     by_slip: ClassVar[bool] = False
+
+
+class _BySlip(_InTime):
+    """Attributes of correlations that fade by sliding only."""
+
+    by_slip: ClassVar[bool] = True
+
+
+@keyed()
+class Time(_InTime):
+    """Modes renew in time: λ = 1/time."""
 
     time: Annotated[
         float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)
@@ -290,11 +300,8 @@ class Time:
 
 
 @keyed()
-class Slip:
+class Slip(_BySlip):
     """Modes renew by sliding: λ = \\|V\\|/length, so a contact at rest keeps its pattern."""
-
-    power: ClassVar[int] = 0
-    by_slip: ClassVar[bool] = True
 
     length: Annotated[
         float, Quantity("m", "correlation length of the fluctuations", "l", above=0)
@@ -307,11 +314,10 @@ class Slip:
 
 
 @keyed()
-class Wave:
+class Wave(_BySlip):
     """A mode renews after sliding ``waves`` of its own wavelengths: λ = \\|V\\| q/(2π waves)."""
 
     power: ClassVar[int] = 1
-    by_slip: ClassVar[bool] = True
 
     waves: Annotated[
         float,
@@ -327,11 +333,10 @@ class Wave:
 
 
 @keyed()
-class Diffusion:
+class Diffusion(_InTime):
     """Modes diffuse away in time: λ = D q²."""
 
     power: ClassVar[int] = 2
-    by_slip: ClassVar[bool] = False
 
     diffusivity: Annotated[
         float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)
@@ -428,19 +433,13 @@ class SmoothProcess:
 
     def draws(self, state: Fluctuation, steps: range, noise: Noise) -> Draws:
         """Return what a compiled loop needs to follow the energy in some ``steps``, which it does not draw."""
-        none, members = np.empty(0), len(noise.members)
-        energy, constant = (
-            np.empty((len(steps) + 1, members)),
-            (True, 1.0, self.energy, self.amplitude.relaxing, False),
-        )
+        members = len(noise.members)
         return Draws(
-            np.empty((members, 0)),
-            energy,
-            none,
-            none,
-            none,
-            *constant,
-            noise.at(steps.start),
+            values=np.empty((members, 0)),
+            energy=np.empty((len(steps) + 1, members)),
+            mean=self.energy,
+            relaxing=self.amplitude.relaxing,
+            address=noise.at(steps.start),
         )
 
     @property

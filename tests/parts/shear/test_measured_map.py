@@ -290,7 +290,7 @@ def test_members_alone_restarts_and_few_records_agree_under_a_measured_map():
         check_cuts(scenario, course, end)
         energy = sim.run(scenario)["fluctuation_energy"]
         assert ("member" in energy.dims) == (
-            shear.contact == "disc" or shear.reads_stress
+            shear.contact == "disc" or shear.amplitude.reads_stress
         )
 
 
