@@ -33,10 +33,12 @@ from sim.units.errors import BadInput
 #: Bytes that a request may have, a table of 2 MB in it escaped; jobs at once.
 _MOST_BYTES, _MOST_JOBS = 4_200_000, 2
 _RUN = "/run"
+#: Addresses whose answers wait for no other ones.
+_PROMPT = ("/curves", "/motion", "/others", "/shown")
 #: Words of an address that are none of a slider, and most words of an address.
 _VIEW, _MOST_FIELDS = ("share", "absolute", "first", "loads", "figure"), 200
 #: Figures of a page; types of its files.
-_FIGURES = ("motion", "sweep", "speed")
+_FIGURES = ("motion", "sweep", "speed", "data", "spread", "map")
 _TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline'; connect-src 'self';"
@@ -52,7 +54,7 @@ class Query(BaseModel, extra="forbid", allow_inf_nan=False, strict=True):
     values: Annotated[dict[str, float | str], Field(max_length=100)] = {}
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
     loads: bool = False
-    figure: Literal["speed", "sweep"] = "speed"
+    figure: Literal["speed", "sweep", "motion", "data", "spread", "map"] = "speed"
     run: Annotated[str, Field(max_length=32)] = ""
     step: Annotated[int, Field(ge=0)] = 0
     data: str | None = None
@@ -75,7 +77,7 @@ class Guarded:
         self.token = secrets.token_urlsafe(32)
         self._page, self._locks = (
             page,
-            {path: threading.Lock() for path in ("/curves", "/motion", "")},
+            {path: threading.Lock() for path in (*_PROMPT, "")},
         )
         self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
         static = Path(__file__).with_name("static").iterdir()
@@ -98,6 +100,7 @@ class Guarded:
             "/others": lambda query: page.others(
                 query.values, query.figure, query.loads
             ),
+            "/shown": lambda query: page.figure(query.values, query.figure, query.data),
             "/motion": lambda query: page.motions.advance(
                 page.read(query.values), query.run, query.step
             ),
@@ -230,7 +233,7 @@ class Guarded:
             raise Refused(403, "no JSON")
 
     def _answer(self, path: str, query: Query) -> Any:
-        # curves and motions wait for no slow answer; the rest take turns, because their first ones import modules
+        # the rest take turns, because their first ones import modules
         with self._locks[path if path in self._locks else ""]:
             return self._answers[path](query)
 
@@ -311,7 +314,7 @@ def _import_answers() -> None:
 
     Imports compile sources, and CPython 3.11 raises a SystemError if several threads convert syntax trees at once.
     """
-    for name in ("scipy.optimize", "sim.explorer.job"):
+    for name in ("scipy.optimize", "sim.explorer.job", "sim.study.fit"):
         importlib.import_module(name)
 
 

@@ -254,6 +254,10 @@ addEventListener("keydown", (event) => {
 // The figure
 
 on("pin", "click", () => update(change.pinned(state)));
+on("plot", "click", ({ target }) => {
+  const point = state.answers.shown?.answer.plays?.[target.dataset.name];
+  if (point) update(change.begun(state, point));
+});
 on("at", "input", () => update({ ...state, reading: Number($("at").value) }));
 on("numbers", "toggle", () => update({ ...state }));
 on("play", "click", () => {
