@@ -70,7 +70,8 @@ def _panels(problem: "Problem", x: Array) -> list[dict[str, Any]]:
     result = []
     for name in dict.fromkeys(course.name for course in every):
         drawn = [course for course in every if course.name == name]
-        along, places = drawn[0].along, np.concatenate([one.x for one in drawn])
+        along = drawn[0].along
+        places = along.values
         is_log = axis_scale(places) == "log"
         has_errors = not problem.estimated[problem.of(name)].any()
         (per_x, unit_x), (per_y, unit_y) = _scales(problem, name, places, along.unit)
@@ -126,13 +127,35 @@ def band(
     result = []
     for fits in zip(*every, strict=True):
         course, curves = fits[0], np.array([one.smooth for one in fits])
-        places = problem.tables[0].conditions.get(course.along.key, course.x)
-        across, upper = _scales(problem, course.name, places, course.along.unit)
+        along = course.along
+        across, upper = _scales(problem, course.name, along.values, along.unit)
         low, high = upper[0] * curves.min(0), upper[0] * curves.max(0)
         colour = _COLOURS[course.label % len(_COLOURS)]
         more = {"high": listed(high), "name": "draws", "opacity": 0.3}
         more |= {"of": course.name}
         result.append(_mark("band", across[0] * course.fine, low, colour, **more))
+    return result
+
+
+def rings(problem: "Problem", points: Sequence[dict[str, float]]) -> list[Any]:
+    """Return further points of a plan, by their conditions [SI], as rings on the curve ``of`` each variable."""
+    from sim.study.fit import courses
+    from sim.study.likelihood import Curve, problem_of
+
+    (table,) = problem.tables
+    curves = [Curve(name, np.zeros(1), np.ones(1)) for name in table.names]
+    every = {course.name: course for course in courses(problem, problem.start)[0]}
+    result = []
+    for point in points:
+        conditions = {key: np.array([value]) for key, value in point.items()}
+        row = table._replace(conditions=conditions, curves=tuple(curves), baseline=0)
+        further = problem_of(problem.groups[0][0].scenario, [row], [], {})
+        for name, value in zip(table.names, further.steady(further.start), strict=True):
+            along = every[name].along
+            across, upper = _scales(problem, name, along.values, along.unit)
+            x, y = across[0] * conditions[along.key], upper[0] * np.array([value])
+            more = {"of": name, "name": "plan", "size": 8, "label": "measure next"}
+            result.append(_mark("points", x, y, "own", **more))
     return result
 
 

@@ -1,6 +1,7 @@
 """The state of a page and its answers: sliders of a scenario, curves of steady sliding, and sentences about them."""
 
 import contextlib
+import difflib
 import itertools
 import math
 import secrets
@@ -16,8 +17,10 @@ from sim.ensemble.plan import Plan, seconds_a_step
 from sim.explorer import figures
 from sim.explorer.drawing import listed
 from sim.explorer.motion import Motions, course
+from sim.numerics.files import output
 from sim.parts.exchange import Array
 from sim.scenario.files import question_of
+from sim.scenario.reader import load
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import entries, quantities
 from sim.scenario.sweep import rows
@@ -112,6 +115,8 @@ class Page:
 
     def __init__(self, scenario: Scenario, data: Path | None = None) -> None:
         self._asked, self.tables = scenario, dict[str | None, "Measured"]()
+        self._sources = dict[str, tuple[str | Path, str]]()
+        self.stamp = stamp_of(Path(scenario.source.path))
         self.scenario = scenario.with_values({})
         self.speeds = _speeds(self.scenario)
         self.axis = _axis(scenario)
@@ -130,6 +135,11 @@ class Page:
             with contextlib.suppress(BadInput):
                 return self.add(path, path.name)
         return None
+
+    @property
+    def path(self) -> str:
+        """Path of the scenario's file, "" if it has none."""
+        return self._asked.source.path
 
     @property
     def figures(self) -> list[str]:
@@ -183,6 +193,7 @@ class Page:
             "title": self.scenario.name,
             "question": question_of(self._asked.source.text)[0],
             "path": self._asked.source.path,
+            "stamp": self.stamp,
             "sliders": [slider._asdict() for slider in self.sliders],
             "points": points if self._is_slidable(points) else [],
             "mechanisms": [
@@ -391,11 +402,14 @@ class Page:
             ]
         return [scene]
 
-    def add(self, source: str | Path, name: str) -> str:
+    def add(self, source: str | Path, name: str, key: str = "") -> str:
         """Read a table of measured curves, its text or a file, and return the name by which an ``answer`` shows it."""
         from sim.explorer.data import table_of
 
-        key, table = secrets.token_hex(8), table_of(source, name, self.scenario)
+        key = key or secrets.token_hex(8)
+        table = table_of(source, name, self.scenario)
+        self._sources = dict([*self._sources.items()][1 - _KEPT :])
+        self._sources[key] = source, name
         self.tables = dict([*self.tables.items()][1 - _KEPT :]) | {key: table}
         return key
 
@@ -410,6 +424,56 @@ class Page:
             if value != known[key][1]
         }
         return take.toml(self._asked, changed, self._asked.source.overrides)
+
+    def difference(self, values: Mapping[str, Any]) -> dict[str, str]:
+        """Return the ``text`` of the scenario's file with values of the sliders, and its ``difference`` from the file.
+
+        Raises
+        ------
+        BadInput
+            If the scenario has no file of its user, or none of its numbers is changed.
+        """
+        from sim.explorer import take
+
+        source, package = self._asked.source, Path(__file__).parents[1]
+        if not source.text or Path(source.path).resolve().is_relative_to(package):
+            raise BadInput(["The scenario has no file of yours; save it as TOML"])
+        known, now = quantities(self.scenario), quantities(self.read(values))
+        changed = {key: x for key, (_, x) in now.items() if x != known[key][1]}
+        text = take.toml(self._asked, changed, {}, is_swept=True)
+        before, after = source.text.splitlines(), text.splitlines()
+        name = Path(source.path).name
+        shown = difflib.unified_diff(before, after, name, name, lineterm="")
+        difference = "\n".join(shown)
+        if not difference:
+            raise BadInput(["The file has these numbers already"])
+        return {"text": text, "difference": difference}
+
+    def write(self, values: Mapping[str, Any], stamp: str) -> dict[str, str]:
+        """Write values of the sliders into the scenario's file, if it has not changed since it had a stamp."""
+        text = self.difference(values)["text"]
+        path = Path(self._asked.source.path)
+        if stamp_of(path) != stamp:
+            raise BadInput([f"{path} has changed meanwhile; look at it again"])
+        with output(path) as beside:
+            beside.write_bytes(text.encode())
+        return {}
+
+    def renewed(self) -> "Page":
+        """Return a page of the scenario's file as it is now, with the tables of this one that it can read.
+
+        Raises
+        ------
+        BadInput
+            If the file cannot be read.
+        """
+        source = self._asked.source
+        result = Page(load(source.path, source.overrides))
+        for key, (content, name) in self._sources.items():
+            with contextlib.suppress(BadInput):
+                result.add(content, name, key)
+        result._first = self._first if self._first in result.tables else None
+        return result
 
     def csv(self, values: Mapping[str, Any]) -> str:
         """Return the curves for values of the sliders as a table."""
@@ -460,6 +524,11 @@ class Page:
                 key in marked,
                 None if more is None else 1.0 / more,
             )
+
+
+def stamp_of(path: Path) -> str:
+    """Return the time of the last change of a file, "" if it is none."""
+    return str(path.stat().st_mtime_ns) if path.is_file() else ""
 
 
 def previews(scenario: Scenario) -> Iterator[str]:

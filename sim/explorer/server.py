@@ -26,7 +26,7 @@ from starlette.types import Receive, Scope, Send
 
 from sim.explorer.connection import Connection
 from sim.explorer.drawing import contact
-from sim.explorer.page import Page, Refused as BadValues
+from sim.explorer.page import Page, Refused as BadValues, stamp_of
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
 
@@ -61,7 +61,7 @@ class Query(BaseModel, extra="forbid", allow_inf_nan=False, strict=True):
     text: str = ""
     name: Annotated[str, Field(max_length=300)] = ""
     speed: Annotated[float, Field(gt=0.0, lt=1e6)] = 1.0
-    task: Literal["ensemble", "fit"] = "ensemble"
+    task: Literal["ensemble", "fit", "plan"] = "ensemble"
     members: Annotated[int, Field(ge=1, le=100_000)] = 1
     free: Annotated[list[str], Field(max_length=20)] = []
 
@@ -75,6 +75,7 @@ class Guarded:
 
     def __init__(self, page: Page, port: int, framed: bool = False) -> None:
         self.token = secrets.token_urlsafe(32)
+        self._refused = ""  # stamp of a file that could not be read
         self._page, self._locks = (
             page,
             {path: threading.Lock() for path in (*_PROMPT, "")},
@@ -93,23 +94,30 @@ class Guarded:
             "cache-control": "no-store",
         }
         self._answers: dict[str, Callable[[Query], Any]] = {
-            "/start": lambda query: page.start(),
-            "/curves": lambda query: page.answer(
+            "/start": lambda query: self._page.start(),
+            "/curves": lambda query: self._page.answer(
                 query.values, query.share, query.figure, query.data
             ),
-            "/others": lambda query: page.others(
+            "/others": lambda query: self._page.others(
                 query.values, query.figure, query.loads
             ),
-            "/shown": lambda query: page.figure(query.values, query.figure, query.data),
-            "/motion": lambda query: page.motions.advance(
-                page.read(query.values), query.run, query.step
+            "/shown": lambda query: self._page.figure(
+                query.values, query.figure, query.data
             ),
-            "/words": lambda query: page.words(query.values),
-            "/band": lambda query: page.band(query.values),
-            "/contact": lambda query: contact(page.read(query.values), query.speed),
-            "/data": lambda query: {"data": page.add(query.text, query.name)},
-            "/toml": lambda query: {"text": page.toml(query.values)},
-            "/csv": lambda query: {"text": page.csv(query.values)},
+            "/motion": lambda query: self._page.motions.advance(
+                self._page.read(query.values), query.run, query.step
+            ),
+            "/words": lambda query: self._page.words(query.values),
+            "/band": lambda query: self._page.band(query.values),
+            "/contact": lambda query: contact(
+                self._page.read(query.values), query.speed
+            ),
+            "/data": lambda query: {"data": self._page.add(query.text, query.name)},
+            "/file": lambda query: self._followed(),
+            "/difference": lambda query: self._page.difference(query.values),
+            "/write": lambda query: self._page.write(query.values, query.text),
+            "/toml": lambda query: {"text": self._page.toml(query.values)},
+            "/csv": lambda query: {"text": self._page.csv(query.values)},
         }
         self._places, self._jobs = asyncio.Semaphore(_MOST_JOBS), set[Process]()
 
@@ -138,21 +146,30 @@ class Guarded:
         answer.headers.update(self._headers)
         await answer(scope, receive, send)
 
+    def _followed(self) -> dict[str, str]:
+        """Return the stamp of the scenario's file, whose page takes the place of that of an earlier one."""
+        page = self._page
+        stamp = stamp_of(Path(page.path))
+        if stamp not in ("", page.stamp, self._refused):
+            try:
+                self._page = page.renewed()
+            except BadInput:
+                self._refused = stamp
+                raise
+        return {"stamp": self._page.stamp}
+
     def _task(self, query: Query) -> tuple[list[str], bytes]:
         """Return the command of the job that is asked for, and what it reads."""
-        from sim.explorer.job import command, ensemble, fitted
+        from sim.explorer.job import command, ensemble, fitted, planned
 
         if query.task == "ensemble":
-            return command(
-                functools.partial(
-                    ensemble, self._page.scenes(query.values, query.members)
-                )
-            )
+            scenes = self._page.scenes(query.values, query.members)
+            return command(functools.partial(ensemble, scenes, describes=True))
         if (table := self._page.tables.get(query.data)) is None or not query.free:
             raise Refused(400, "a fit needs a table and numbers that are free")
-        return command(
-            functools.partial(fitted, self._page.read(query.values), table, query.free)
-        )
+        task = fitted if query.task == "fit" else planned
+        scene = self._page.read(query.values)
+        return command(functools.partial(task, scene, table, query.free))
 
     async def _stream(
         self, query: Query, scope: Scope, receive: Receive, send: Send

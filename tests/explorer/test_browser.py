@@ -819,6 +819,66 @@ def test_a_band_that_was_slow_follows_later_moves_again(random):
     assert "too long" not in random.locator("#ran").text_content()
 
 
+def test_the_page_follows_the_file_and_writes_back_after_it_shows_the_difference(
+    browser, lens
+):
+    with explored(lens) as (_, address), opened(browser, address) as page:
+        enter(page, "3 mm")
+        idle(page)
+        page.locator("#save summary").click()
+        page.get_by_text("write back").click()
+        shown = page.locator("#change pre")
+        wait(page, lambda: '+radius = "3 mm"' in shown.text_content(), "no difference")
+        assert 'radius = "2 mm"' in lens.read_text(encoding="utf-8")
+        page.locator("#cancel").click()
+        assert not page.locator("#change").is_visible()
+        page.locator("#save [data-kind=difference]").click()
+        page.locator("#write").click()
+        wait(page, lambda: RADIUS not in page.url, "the file has another number")
+        settled(page)
+        idle(page)
+        assert 'radius = "3 mm"' in lens.read_text(encoding="utf-8")
+        assert value(page) == "3 mm" and page.locator("#reset").is_disabled()
+        # a file that is saved by another program is shown, one with a fault is named
+        text = lens.read_text(encoding="utf-8").replace('"3 mm"', '"4 mm"')
+        lens.write_text(text, encoding="utf-8")
+        wait(page, lambda: value(page) == "4 mm", "the page does not follow")
+        settled(page)
+        lens.write_text(text.replace('"4 mm"', '"4 kg"'), encoding="utf-8")
+        trouble = page.locator("#trouble")
+        wait(page, lambda: "kg" in trouble.text_content(), "the fault is not named")
+        assert value(page) == "4 mm"
+
+
+def test_a_fit_has_a_band_over_residuals_and_the_last_run_a_paragraph(browser):
+    looks = {"permissions": ["clipboard-read", "clipboard-write"]}
+    with scenario(browser, "measured_lens", **looks) as page:
+        idle(page)
+        assert "tick the numbers" in lost(page)
+        for key in ("bonds.critical_speed", "bonds.stress"):
+            page.locator(f"#free input[value='{key}']").check()
+        page.locator("#fit").click()
+        wait(page, lambda: page.locator("#fitted").is_visible(), "no fit")
+        idle(page)
+        assert "tick the numbers" not in lost(page)
+        assert page.locator("#plot [data-name=draws]").count() == 2
+        assert page.locator("#plot [data-name=residual]").count() == 20
+        enter(page, "3 mm")
+        idle(page)
+        assert page.locator("#plot [data-name=draws]").count() == 0
+        page.locator("#copy summary").click()
+        page.locator("#copy [data-what=methods]").click()
+        wait(
+            page, lambda: "first" in page.locator("#trouble").text_content(), "no word"
+        )
+        page.locator("#run").click()
+        wait(page, lambda: page.evaluate("explored.run !== null"), "no run")
+        page.locator("#copy [data-what=methods]").click()
+        wait(page, lambda: page.locator("#copied").text_content(), "not copied")
+        text = page.evaluate("navigator.clipboard.readText()")
+        assert "sphere" in text and "@" in text and "3 mm" in text
+
+
 def test_a_slider_beyond_its_partner_is_undone_whole(browser):
     key = "shear.spectrum.shortest"
     with scenario(browser, "pdms_lens") as page:

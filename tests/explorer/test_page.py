@@ -15,12 +15,14 @@ from numpy.testing import assert_allclose
 import sim
 from sim.explorer import take
 from sim.explorer.drawing import contact
-from sim.explorer.job import ensemble
+from sim.explorer.figures import rings
+from sim.explorer.job import ensemble, fitted
 from sim.explorer.page import Page, Refused, previews
 from sim.explorer.server import Server, state_of
 from sim.laws import jkr
 from sim.parts.shear import models
 from sim.study.curves import curves, speeds_of_loss
+from sim.study.likelihood import problem_of
 
 SCENARIOS = (
     "pdms_lens",
@@ -547,6 +549,66 @@ def test_the_sentence_names_where_adhesion_is_masked_and_friction_is_largest():
     assert f"{1e3 * force.max():.4g} mN" in words("friction_maximum")
     assert f"about {1e3 * speeds[force.argmax()]:.2g} mm/s" in words("friction_maximum")
     assert "largest" not in words("pdms_lens")
+
+
+def test_the_band_of_a_fit_holds_its_curve_and_is_as_wide_as_its_errors():
+    page = Page(sim.load("scenarios/measured_lens.toml"))
+    table = page.tables[page.start()["data"]]
+    free = ["bonds.critical_speed", "bonds.stress"]
+    answer = fitted(page.scenario, table, free, lambda message: None)
+    values = {key: number["value"] for key, number in answer["numbers"].items()}
+    shown = page.figure(values, "data", page.start()["data"])["panels"]
+    for band in answer["marks"]:
+        (panel,) = (one for one in shown if one.get("of") == band["of"])
+        line = panel["marks"][0]
+        low, middle, high = (np.array(y) for y in (band["y"], line["y"], band["high"]))
+        assert_allclose(band["x"], line["x"], rtol=1e-9)
+        assert np.all(low <= middle) and np.all(middle <= high)
+    # at low speed friction is the stress times an area that the fit leaves as it is
+    result = sim.fit(
+        "scenarios/measured_lens.toml", "scenarios/measured_lens.csv", free
+    )
+    error = result.errors["bonds.stress"] / result.values["bonds.stress"]
+    force = answer["marks"][1]
+    width = (force["high"][0] - force["y"][0]) / force["y"][0] / error
+    # the range of 30 normal draws is 4.09(69) standard deviations
+    assert abs(width - 4.09) < 4.0 * 0.69
+
+
+def test_rings_of_a_plan_are_on_the_curves_at_their_conditions():
+    page = Page(sim.load("scenarios/measured_lens.toml"))
+    problem = problem_of(page.scenario, [page.tables[page.start()["data"]]], [], {})
+    marks = rings(problem, [{"speed": 3e-3}])
+    exact = curves(page.scenario, np.array([3e-3]))
+    factors = {"contact_area": 1e6, "friction_force": 1e3}
+    assert [mark["of"] for mark in marks] == [*factors]
+    for mark in marks:
+        assert_allclose(mark["x"], [3.0], rtol=1e-12)
+        assert_allclose(mark["y"], factors[mark["of"]] * exact[mark["of"]], rtol=1e-9)
+
+
+def test_numbers_are_written_back_after_their_difference_and_the_page_follows_the_file(
+    tmp_path,
+):
+    path = tmp_path / "lens.toml"
+    text = LENS + '\n[sweep]\n"contact.load" = ["1 mN", "4 mN"]\n'
+    path.write_text(text, encoding="utf-8")
+    page = Page(sim.load(path))
+    with pytest.raises(sim.BadInput, match="already"):
+        page.difference({})
+    shown = page.difference({"sphere.radius": 3e-3})["difference"].splitlines()
+    changed = [line for line in shown if line[0] in "+-" and line[1] not in "+-"]
+    assert [line[0] for line in changed] == ["-", "+"] and "3 mm" in changed[1]
+    assert path.read_text(encoding="utf-8") == text
+    with pytest.raises(sim.BadInput, match="has changed meanwhile"):
+        page.write({"sphere.radius": 3e-3}, "1")
+    table = page.add("speed,contact_radius\n1,1.1e-4\n2,1e-4\n", "own.csv")
+    page.write({"sphere.radius": 3e-3}, page.stamp)
+    new = page.renewed()
+    assert new.scenario.sphere.radius == 3e-3 and len(new.start()["points"]) == 2
+    assert new.stamp != page.stamp and table in new.tables
+    with pytest.raises(sim.BadInput, match="no file of yours"):
+        Page(sim.load(tomllib.loads(LENS))).difference({"sphere.radius": 3e-3})
 
 
 def test_other_curves_are_those_of_the_other_points_of_a_sweep_and_of_other_loads():

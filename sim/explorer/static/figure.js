@@ -7,7 +7,7 @@
 /** What a panel shows: `line`, `band` (between `y` and `high`), `points` (with errors), `rule` (at the places `x`), and
  * `image` (of the address `name` between the ends `x` and `y`).
  * @typedef {{ kind: "line" | "band" | "points" | "rule" | "image", x: Numbers, y: Numbers, high?: Numbers, colour: string,
- *   width?: number, dash?: string, opacity?: number, label?: string, name?: string }} Mark */
+ *   width?: number, size?: number, dash?: string, opacity?: number, label?: string, name?: string }} Mark */
 /** @typedef {{ x: Axis, y: Axis, height: number, marks: Mark[] }} Panel */
 /** @typedef {{ ink: string, soft: string, grid: string, back: string }} Theme */
 
@@ -246,7 +246,7 @@ function shapes(mark, right, up, ends) {
       ...about,
       cx: across.toFixed(1),
       cy: along.toFixed(1),
-      r: 3.5,
+      r: mark.size ?? 3.5,
       fill: "none",
       stroke: colour,
       "stroke-width": width,

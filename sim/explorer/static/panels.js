@@ -3,7 +3,7 @@
 import { current, differences, isCurrent, isDescribed, nameOf, nameOfRun } from "./answer.js";
 import { axisOf } from "./figure.js";
 import { greek, lettered, scaled } from "./notation.js";
-import { same } from "./state.js";
+import { isFitted, same } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./figure.js").Panel} Panel */
@@ -55,8 +55,10 @@ export function describedOf(state) {
  * @returns {Panel[]} */
 function ofServer(state, theme) {
   const found = describedOf(state)?.answer.panels ?? [];
-  return found.map((/** @type {any} */ { x, y, height, marks }) => {
-    const drawn = marks.map((/** @type {any} */ mark) => ({
+  const more = isFitted(state) ? (state.fit?.answer.marks ?? []) : [];
+  return found.map((/** @type {any} */ { of, x, y, height, marks }) => {
+    const own = more.filter((/** @type {any} */ mark) => of && mark.of === of);
+    const drawn = [...own, ...marks].map((/** @type {any} */ mark) => ({
       ...mark,
       label: greek(mark.label ?? ""),
       colour: /** @type {any} */ (COLOURS)[mark.colour] ?? theme.ink,

@@ -5,7 +5,7 @@ import { built, diverging, figure, frames, h, axisOf, placed, ticked } from "./f
 import { picture, ratio, reading } from "./live.js";
 import { digits, engineering, greek, lettered, scaled } from "./notation.js";
 import { COLOURS, curvesOf, describedOf, panels, tableOf } from "./panels.js";
-import { hasEnded, isOriginal, placeOf, same, textOf } from "./state.js";
+import { hasEnded, isFitted, isOriginal, placeOf, same, textOf } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./state.js").Slider} Slider */
@@ -222,14 +222,6 @@ function interval(state, slider, track) {
   else track.append(drawn);
 }
 
-/** Return true if the state has the numbers of the last fit, and those that the fit started from otherwise.
- * @param {State} state */
-function isFitted({ fit, values, table }) {
-  return (
-    fit !== null && fit.of.data === table && same({ ...fit.of.values, ...fit.values }, { ...fit.of.values, ...values })
-  );
-}
-
 /** Return the numbers to which the figure that is drawn belongs.
  * @param {State} state */
 function valuesOf(state) {
@@ -315,7 +307,7 @@ function data(state) {
   const { fit, table } = state;
   const found = curvesOf(state)?.data;
   $("free").hidden = !table;
-  $("fit").disabled = !table || Boolean(state.job);
+  $("fit").disabled = $("plan").disabled = !table || Boolean(state.job);
   if (found) {
     const residuals = Object.values(/** @type {Record<string, any>} */ (found.points)).flatMap(
       (points) => points.residuals,

@@ -9,7 +9,7 @@ import { engineering } from "./notation.js";
  *   logarithmic: boolean, marked: boolean, over_wavelength: number | null }} Slider */
 /** @typedef {"motion" | "sweep" | "speed" | "data" | "spread" | "map"} Figure */
 /** What the server tells once.
- * @typedef {{ title: string, question: string, path: string, sliders: Slider[], points: Values[],
+ * @typedef {{ title: string, question: string, path: string, stamp: string, sliders: Slider[], points: Values[],
  *   mechanisms: { key: string, name: string, on: number }[], figures: Figure[], preview: string[], members: number,
  *   duration: number, speed: number, mount: string, data: string | null }} Start */
 /** @typedef {{ share: number, absolute: boolean, first: boolean, loads: boolean, figure: Figure }} View */
@@ -246,6 +246,14 @@ export function withFit(state) {
   return state.fit ? moved(state, state.fit.values) : state;
 }
 
+/** Return true if the state has the numbers of the last fit, and those that the fit started from otherwise.
+ * @param {State} state */
+export function isFitted({ fit, values, table }) {
+  return (
+    fit !== null && fit.of.data === table && same({ ...fit.of.values, ...fit.values }, { ...fit.of.values, ...values })
+  );
+}
+
 /** Return the state after the result of a job.
  * @param {State} state
  * @param {any} of
@@ -258,7 +266,7 @@ export function finished(state, of, result) {
   const values = Object.fromEntries(numbers.map(([key, { value }]) => [key, value]));
   const withResult = { ...next, fit: { of, answer: result, values } };
   const isAsked = same(of.values, state.values) && of.data === state.table;
-  return isAsked ? withFit(withResult) : withResult;
+  return isAsked && numbers.length ? withFit(withResult) : withResult;
 }
 
 /** Return the state in which its present curves are pinned for comparison, or none if they were.
