@@ -17,6 +17,7 @@ import numpy as np
 import psutil
 import pytest
 from helpers.commands import COUNTED, LENS, RAMP
+from helpers.firefox import firefox
 from numpy.testing import assert_allclose
 
 import sim
@@ -29,6 +30,7 @@ CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
     "",
 )
+FIREFOX = next(filter(None, map(shutil.which, ("firefox-esr", "firefox"))), "")
 pytestmark = [
     pytest.mark.verify,
     pytest.mark.skipif(not CHROMIUM, reason="no Chromium"),
@@ -1236,13 +1238,32 @@ class Walk:
         assert facts["bars"] == (facts["fitted"] if facts["isFitOf"] else 0)
 
 
+@contextlib.contextmanager
+def opened_in(engine, request, address):
+    """A page in Chromium, or in Firefox by a driver of our own."""
+    if engine == "chromium":
+        with opened(request.getfixturevalue("browser"), address) as page:
+            yield page
+        return
+    if not FIREFOX:
+        pytest.skip("no Firefox")
+    with firefox(FIREFOX) as page:
+        page.goto(address)
+        settled(page)
+        yield page
+
+
 @pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("engine", ["chromium", "firefox"])
 def test_after_any_gesture_all_that_is_shown_belongs_to_the_same_numbers(
-    browser, tmp_path, seed
+    request, tmp_path, engine, seed
 ):
     path = tmp_path / "random.toml"
     path.write_text(LENS + RAMP + COUNTED + WAVES, encoding="utf-8")
-    with explored(path) as (_, address), opened(browser, address) as page:
+    with (
+        explored(path) as (_, address),
+        opened_in(engine, request, address) as page,
+    ):
         walk = Walk(page, path, seed)
         for _ in range(GESTURES):
             walk.gesture()
