@@ -263,7 +263,8 @@ class Page:
         }
         energies = ("work_of_adhesion", "fluctuation_energy")
         largest |= dict.fromkeys(energies, max(largest[name] for name in energies))
-        crossings = [] if swept else speeds_of_loss(scene, share, x)
+        ratio = columns["area_ratio"]
+        crossings = [] if swept else speeds_of_loss(scene, share, x, ratio)
         result: dict[str, Any] = {
             "values": self._numbers(scene),
             "x": x.tolist(),
