@@ -23,6 +23,8 @@ from sim.units.terminal import duration
 
 #: Most points of a band that are drawn.
 _DRAWN = 1000
+#: Simulated data sets of a plan, fewer than those of the command.
+_SIMS = 100
 #: Quantities that are drawn.
 _NAMES = ("contact_area", "friction_force")
 
@@ -32,21 +34,30 @@ _BEGIN = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from sim.
 Say = Callable[[dict[str, Any]], None]
 
 
-def ensemble(scenes: list[Scenario], say: Say) -> dict[str, Any]:
+def ensemble(
+    scenes: list[Scenario], say: Say, describes: bool = False
+) -> dict[str, Any]:
     """Run scenes that differ in their speed, and return what is drawn of them.
 
-    ``say`` takes the share that is done, and the time that is left in words.
+    ``say`` takes the share that is done, and the time that is left in words. If the result ``describes`` a single
+    scene, it has the paragraph of methods.
     """
     whole, done = sum(work(Plan.of(scene)) for scene in scenes), 0
-    began = time.monotonic()
+    shown = _clock(say)
 
     def progress(steps: int) -> None:
         nonlocal done
         done += steps
-        left = (time.monotonic() - began) * (whole - done) / done
-        say({"done": done / whole, "left": duration(left)})
+        shown(done, whole)
 
-    first, *others = [summary(scene, run(scene, progress=progress)) for scene in scenes]
+    runs = [run(scene, progress=progress) for scene in scenes]
+    first, *others = [
+        summary(scene, dataset) for scene, dataset in zip(scenes, runs, strict=True)
+    ]
+    if describes and not others:
+        from sim.reports.methods import methods
+
+        first["methods"] = str(methods(runs[0]))
     for other in others if first["along"] == "speed" else []:
         first["speed"] += other["speed"]
         for name, kinds in first["curves"].items():
@@ -55,8 +66,34 @@ def ensemble(scenes: list[Scenario], say: Say) -> dict[str, Any]:
     return first
 
 
+def _clock(say: Say) -> Callable[[int, int], None]:
+    """Return a function that says the share of steps that are done, and the time that the others take."""
+    began = time.monotonic()
+
+    def progress(done: int, whole: int) -> None:
+        left = (time.monotonic() - began) * (whole - done) / done
+        say({"done": done / whole, "left": duration(left)})
+
+    return progress
+
+
+def planned(
+    scenario: Scenario, table: Any, free: list[str], say: Say
+) -> dict[str, Any]:
+    """Plan a measurement at the points of a table: return what it can tell in words, and where to measure next."""
+    from sim.explorer.figures import rings
+    from sim.study.likelihood import problem_of
+    from sim.study.plan import plan
+
+    result = plan(scenario, table, free, sims=_SIMS, progress=_clock(say))
+    further = [point.conditions for point in result.best]
+    marks = rings(problem_of(scenario, [table], [], {}), further)
+    return {"numbers": {}, "text": repr(result), "remarks": [], "marks": marks}
+
+
 def fitted(scenario: Scenario, table: Any, free: list[str], say: Say) -> dict[str, Any]:
-    """Fit keys of a scenario to a table; return their values with 95 % intervals in SI and as text, and chi^2."""
+    """Fit keys of a scenario to a table; return values with 95 % intervals in SI, in words, and the band of curves."""
+    from sim.explorer.figures import band
     from sim.study.fit import fit
 
     say({"done": 0.0})
@@ -72,9 +109,11 @@ def fitted(scenario: Scenario, table: Any, free: list[str], say: Say) -> dict[st
     }
     return {
         "numbers": numbers,
-        "chi_square": result.best.chi_square,
         "text": repr(result),
         "remarks": result.remarks,
+        "marks": band(
+            result.problem, result.best.x, result.best.covariance, scenario.seed
+        ),
     }
 
 

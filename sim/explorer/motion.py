@@ -12,6 +12,8 @@ from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.step.state import MemberNoise, State, pack
 
+#: Parts of a long motion that is drawn beside another one.
+_PARTS = 200
 #: Motions that are kept; blocks of a motion; time of an answer [s]; digits of a number.
 _KEPT, _BLOCKS, _LONG, _DIGITS = 4, 100, 0.1, 6
 #: Quantities that are sent, those of a slider that is driven through a spring or by a force, and of a moving mount.
@@ -81,15 +83,9 @@ class Motions:
             )
             motion.states[last], step = state, last
             courses.append(course)
-        columns = {"t": [x for course in courses for x in _rounded(course.time)]}
-        for name in _names(scene):
-            columns[name] = [
-                x
-                for course in courses
-                for x in _rounded(
-                    np.broadcast_to(READ[name](scene, course), course.time.shape)
-                )
-            ]
+        columns = {
+            name: _rounded(values) for name, values in _columns(scene, courses).items()
+        }
         return {
             "run": run,
             "first": first,
@@ -99,6 +95,36 @@ class Motions:
             "is_new": bool(is_new),
             "columns": columns,
         }
+
+
+def course(scene: Scenario) -> dict[str, list[float | None]]:
+    """Return the whole motion of the first member of a scene.
+
+    Of a long one each of 200 parts keeps its first record, and the least and the largest number of each column.
+    """
+    stepper, noise = scene.stepper, MemberNoise.of(scene.seed, np.arange(1))
+    whole = range(scene.clock.steps + 1)
+    columns = _columns(scene, [stepper.advance(stepper.start(noise), noise, whole)[1]])
+    kept = set[int]()
+    for part in np.array_split(np.arange(len(whole)), min(_PARTS, len(whole))):
+        kept.add(int(part[0]))
+        for values in columns.values():
+            here = np.nan_to_num(values[part])
+            kept |= {int(part[here.argmin()]), int(part[here.argmax()])}
+    order = sorted(kept)
+    return {name: _rounded(values[order]) for name, values in columns.items()}
+
+
+def _columns(scene: Scenario, courses: list[Any]) -> dict[str, Array]:
+    """Return time and quantities of the parts of a motion, one after the other."""
+    columns = {"t": np.concatenate([np.ravel(one.time) for one in courses])}
+    for name in _names(scene):
+        parts = [
+            np.ravel(np.broadcast_to(READ[name](scene, one), one.time.shape))
+            for one in courses
+        ]
+        columns[name] = np.concatenate(parts)
+    return columns
 
 
 def _names(scene: Scenario) -> list[str]:

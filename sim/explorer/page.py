@@ -1,6 +1,7 @@
 """The state of a page and its answers: sliders of a scenario, curves of steady sliding, and sentences about them."""
 
 import contextlib
+import difflib
 import itertools
 import math
 import secrets
@@ -13,10 +14,13 @@ import numpy as np
 
 from sim.ensemble.diagnosis import diagnosis, over_band, remarks
 from sim.ensemble.plan import Plan, seconds_a_step
+from sim.explorer import figures
 from sim.explorer.drawing import listed
-from sim.explorer.motion import Motions
+from sim.explorer.motion import Motions, course
+from sim.numerics.files import output
 from sim.parts.exchange import Array
 from sim.scenario.files import question_of
+from sim.scenario.reader import load
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import entries, quantities
 from sim.scenario.sweep import rows
@@ -35,8 +39,12 @@ _NO_SLIDERS = ("clock", "ensemble", "instrument", "record", "seed", "zero")
 _DRIVE, _NUMERICS = "drive", ("drive.tolerance",)
 #: Ends of a slider over the value of its key: of a positive key, and of one that may be zero.
 _FACTOR, _TIMES = 30.0, 4.0
+#: Factor by which a maximum of friction is above both ends of a curve.
+_CLEAR = 1.01
 #: Loads of further curves over the scenario's; most curves of other points of a sweep.
 _LOADS, _MOST_OTHERS = (0.25, 4.0), 8
+#: Longest time of the motions of other points [s].
+_LONGEST = 8.0
 #: Members of the band, time that it may take [s], and time after which it is tried again [s].
 _FEW, _QUICK, _PAUSE = 8, 0.05, 5.0
 #: Keys that matter most for the area and are marked; tables that are kept.
@@ -107,20 +115,68 @@ class Page:
 
     def __init__(self, scenario: Scenario, data: Path | None = None) -> None:
         self._asked, self.tables = scenario, dict[str | None, "Measured"]()
+        self._sources = dict[str, tuple[str | Path, str]]()
+        self.stamp = stamp_of(Path(scenario.source.path))
         self.scenario = scenario.with_values({})
         self.speeds = _speeds(self.scenario)
         self.axis = _axis(scenario)
         self.sliders = list(self._sliders())
         self.motions = Motions()
         self._slow_until, self._has_run = 0.0, False
-        self._first = None if data is None else self.add(data, str(data))
+        self._moves = any(previews(self.scenario))
+        self._map = _map(scenario)
+        self._first = self._beside() if data is None else self.add(data, str(data))
+
+    def _beside(self) -> str | None:
+        """Return the name of the table of measured curves that stands beside the scenario under its name, if any."""
+        source = self._asked.source.path
+        if source and (path := Path(source).with_suffix(".csv")).is_file():
+            # a file of a course, a map or a spectrum has no measured curve
+            with contextlib.suppress(BadInput):
+                return self.add(path, path.name)
+        return None
+
+    @property
+    def path(self) -> str:
+        """Path of the scenario's file, "" if it has none."""
+        return self._asked.source.path
 
     @property
     def figures(self) -> list[str]:
         """Figures of the page, first the one that shows what the scenario computes."""
-        if any(previews(self.scenario)):
-            return ["motion", "speed"]
-        return [*(["sweep"] if self.axis else []), "speed"]
+        if self._moves:
+            result = [*(["map"] if self._map else []), "motion"]
+        elif self.axis:
+            result = ["sweep"]
+        else:
+            result = ["spread"] if self._spreads else []
+        first = ["data"] if self._first else []
+        return [*first, *result, "speed", *([] if first else ["data"])]
+
+    @property
+    def _spreads(self) -> bool:
+        """Return True if the scenario is about the spread of members at one speed."""
+        return self.scenario.is_random and self.scenario.drive.model == "steady"
+
+    def figure(
+        self, values: Mapping[str, Any], figure: str, table: str | None = None
+    ) -> dict[str, Any]:
+        """Return the panels and the sentence of the figure "data", "spread" or "map"."""
+        scene = self.read(values)
+        if figure == "map" and self._map:
+            return self._map.answer(scene, self._numbers(scene))
+        if figure == "data" and (measured := self.tables.get(table)):
+            return figures.measured(scene, measured)
+        if figure == "spread":
+            changes = list(self._other_points(scene, None))
+            scenes = [scene, *(scene.with_values(change) for change in changes)]
+            names = [_words_of(scene, change) for change in changes]
+            return figures.spread(scenes, ["present numbers" if names else "", *names])
+        return {"panels": [], "words": "There is no table of measured curves"}
+
+    def _numbers(self, scene: Scenario) -> dict[str, float]:
+        known = quantities(scene)
+        return {slider.key: known[slider.key][1] for slider in self.sliders}
 
     def start(self) -> dict[str, Any]:
         """Return what the page needs once, such as title, question, sliders, and points of the sweep."""
@@ -137,6 +193,7 @@ class Page:
             "title": self.scenario.name,
             "question": question_of(self._asked.source.text)[0],
             "path": self._asked.source.path,
+            "stamp": self.stamp,
             "sliders": [slider._asdict() for slider in self.sliders],
             "points": points if self._is_slidable(points) else [],
             "mechanisms": [
@@ -206,10 +263,10 @@ class Page:
         }
         energies = ("work_of_adhesion", "fluctuation_energy")
         largest |= dict.fromkeys(energies, max(largest[name] for name in energies))
-        crossings = [] if swept else speeds_of_loss(scene, share, x)
-        now = quantities(scene)
+        ratio = columns["area_ratio"]
+        crossings = [] if swept else speeds_of_loss(scene, share, x, ratio)
         result: dict[str, Any] = {
-            "values": {slider.key: now[slider.key][1] for slider in self.sliders},
+            "values": self._numbers(scene),
             "x": x.tolist(),
             "axis": _described(scene, swept, x),
             "curves": {name: listed(column) for name, column in columns.items()},
@@ -253,6 +310,8 @@ class Page:
     ) -> dict[str, Any]:
         """Return curves [SI] at the other points of the sweep and, if wanted, at other loads, with their labels."""
         scene = self.read(values, built=False)
+        if figure == "motion":
+            return {"others": list(self._other_motions(values))}
         swept = self.axis if figure == "sweep" else None
         x, load = self._places(swept, None), scene.contact.load
         changes = list(self._other_points(scene, swept))
@@ -270,6 +329,27 @@ class Page:
                 label = _words_of(scene, change)
                 result.append({"label": label, "curves": columns})
         return {"x": x.tolist(), "others": result}
+
+    def _other_motions(self, values: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+        """Yield the motions at the points of the sweep that differ from the present numbers in one key."""
+        scene = self.read(values)
+        present = {entry.key: entry.value for entry in entries(scene)}
+        changes = []
+        for row in rows(self._asked.sweep):
+            other = scene.with_values(row)
+            now = {entry.key: entry.value for entry in entries(other)}
+            changed = [key for key in row if now.get(key) != present.get(key)]
+            if len(changed) == 1:
+                (key,) = changed
+                value = now.get(key) if isinstance(now.get(key), float) else row[key]
+                changes.append((other, {key: value}))
+        estimate = scene.clock.steps * seconds_a_step(scene, 1) * len(changes)
+        if self._map or len(changes) > _MOST_OTHERS or estimate > _LONGEST:
+            return
+        own = course(scene) if changes else {}
+        for other, change in changes:
+            if (columns := course(other)) != own:
+                yield {"label": _words_of(scene, change), "columns": columns}
 
     def _other_points(self, scene: Scenario, swept: str | None) -> Iterator[Any]:
         """Yield the changes of a scenario to the other points of its sweep, at most eight."""
@@ -293,7 +373,7 @@ class Page:
 
     def band(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the band of a few members of the scenario's own models; empty if that takes too long to follow."""
-        if self.figures[0] == "motion":  # shows the first member itself
+        if self._moves:  # the motion shows the first member itself
             return {"reason": ""}
         from sim.explorer.job import ensemble
 
@@ -323,11 +403,14 @@ class Page:
             ]
         return [scene]
 
-    def add(self, source: str | Path, name: str) -> str:
+    def add(self, source: str | Path, name: str, key: str = "") -> str:
         """Read a table of measured curves, its text or a file, and return the name by which an ``answer`` shows it."""
         from sim.explorer.data import table_of
 
-        key, table = secrets.token_hex(8), table_of(source, name, self.scenario)
+        key = key or secrets.token_hex(8)
+        table = table_of(source, name, self.scenario)
+        self._sources = dict([*self._sources.items()][1 - _KEPT :])
+        self._sources[key] = source, name
         self.tables = dict([*self.tables.items()][1 - _KEPT :]) | {key: table}
         return key
 
@@ -342,6 +425,56 @@ class Page:
             if value != known[key][1]
         }
         return take.toml(self._asked, changed, self._asked.source.overrides)
+
+    def difference(self, values: Mapping[str, Any]) -> dict[str, str]:
+        """Return the ``text`` of the scenario's file with values of the sliders, and its ``difference`` from the file.
+
+        Raises
+        ------
+        BadInput
+            If the scenario has no file of its user, or none of its numbers is changed.
+        """
+        from sim.explorer import take
+
+        source, package = self._asked.source, Path(__file__).parents[1]
+        if not source.text or Path(source.path).resolve().is_relative_to(package):
+            raise BadInput(["The scenario has no file of yours; save it as TOML"])
+        known, now = quantities(self.scenario), quantities(self.read(values))
+        changed = {key: x for key, (_, x) in now.items() if x != known[key][1]}
+        text = take.toml(self._asked, changed, {}, is_swept=True)
+        before, after = source.text.splitlines(), text.splitlines()
+        name = Path(source.path).name
+        shown = difflib.unified_diff(before, after, name, name, lineterm="")
+        difference = "\n".join(shown)
+        if not difference:
+            raise BadInput(["The file has these numbers already"])
+        return {"text": text, "difference": difference}
+
+    def write(self, values: Mapping[str, Any], stamp: str) -> dict[str, str]:
+        """Write values of the sliders into the scenario's file, if it has not changed since it had a stamp."""
+        text = self.difference(values)["text"]
+        path = Path(self._asked.source.path)
+        if stamp_of(path) != stamp:
+            raise BadInput([f"{path} has changed meanwhile; look at it again"])
+        with output(path) as beside:
+            beside.write_bytes(text.encode())
+        return {}
+
+    def renewed(self) -> "Page":
+        """Return a page of the scenario's file as it is now, with the tables of this one that it can read.
+
+        Raises
+        ------
+        BadInput
+            If the file cannot be read.
+        """
+        source = self._asked.source
+        result = Page(load(source.path, source.overrides))
+        for key, (content, name) in self._sources.items():
+            with contextlib.suppress(BadInput):
+                result.add(content, name, key)
+        result._first = self._first if self._first in result.tables else None
+        return result
 
     def csv(self, values: Mapping[str, Any]) -> str:
         """Return the curves for values of the sliders as a table."""
@@ -392,6 +525,11 @@ class Page:
                 key in marked,
                 None if more is None else 1.0 / more,
             )
+
+
+def stamp_of(path: Path) -> str:
+    """Return the time of the last change of a file, "" if it is none."""
+    return str(path.stat().st_mtime_ns) if path.is_file() else ""
 
 
 def previews(scenario: Scenario) -> Iterator[str]:
@@ -469,6 +607,15 @@ def _axis(scenario: Scenario) -> str | None:
     return max(axes, key=lambda axis: len(axis.values)).keys[0]
 
 
+def _map(scenario: Scenario) -> "figures.StabilityMap | None":
+    """Return the map of stability of a sweep of the stiffness of the spring alone under a stage of changing speed."""
+    keys = [key for axis in scenario.sweep for key in axis.keys]
+    if keys != ["drive.stiffness"] or not np.ptp(np.abs(scenario.speeds(_TRIED))):
+        return None
+    quantity = quantities(scenario)["drive.stiffness"][0]
+    return figures.StabilityMap([quantity.read(x) for (x,) in scenario.sweep[0].values])
+
+
 def _described(scenario: Scenario, swept: str | None, x: Array) -> dict[str, Any]:
     """Return name, symbol, factor, unit and scale of the axis of a figure."""
     if swept is None:
@@ -483,13 +630,15 @@ def _described(scenario: Scenario, swept: str | None, x: Array) -> dict[str, Any
     return {"name": name, "symbol": symbol, "unit": unit, "log": log}
 
 
-def _words_of(scenario: Scenario, change: Mapping[str, float]) -> str:
-    """Return numbers of a scenario in words, by their symbols."""
-    words = []
+def _words_of(scenario: Scenario, change: Mapping[str, Any]) -> str:
+    """Return values of a scenario in words, by their symbols."""
+    words, known = [], quantities(scenario)
     for key, value in change.items():
-        quantity = quantities(scenario)[key][0]
-        name = quantity.symbol or key.rpartition(".")[2].replace("_", " ")
-        words.append(f"{name} = {engineering(value, quantity.unit)}")
+        name = key.rpartition(".")[2].replace("_", " ")
+        if key in known:
+            quantity = known[key][0]
+            name, value = quantity.symbol or name, engineering(value, quantity.unit)
+        words.append(f"{name} = {value}")
     return ", ".join(words)
 
 
@@ -532,18 +681,23 @@ def _loss(
         return "The contact is open everywhere in this figure"
     limit, least, most = 100.0 * share, np.nanmin(lost), np.nanmax(lost)
     place = "speed" if swept is None else "value"
+    unit = "m/s" if swept is None else quantities(scenario)[swept][0].unit
+    more = _masking(x, columns["work_of_adhesion"], unit)
+    if swept is None:
+        more += _peak(scenario, x, columns["friction_force"])
     if np.all(lost[np.isfinite(lost)] >= limit):
         ends = sorted({f"{least:.3g}", f"{most:.3g}"}, key=float)
-        return f"{limit:.3g} % or more of the area is lost at every {place} shown: {' to '.join(ends)} %"
+        return f"{limit:.3g} % or more of the area is lost at every {place} shown: {' to '.join(ends)} %{more}"
     if most < 1e-6:
-        return f"No area is lost at any {place} shown"
+        return f"With these numbers no area is lost at any {place} shown{more}"
     if not np.any(lost >= limit):
-        return f"Less than {limit:.3g} % of the area is lost at every {place} shown: at most {most:.3g} %"
+        return f"Less than {limit:.3g} % of the area is lost at every {place} shown: at most {most:.3g} %{more}"
     if swept is not None:
         first = int(np.flatnonzero(np.diff(lost >= limit))[0])
-        unit = quantities(scenario)[swept][0].unit
         ends = [engineering(float(end), unit) for end in x[first : first + 2]]
-        return f"{limit:.3g} % of the area is lost between {ends[0]} and {ends[1]}"
+        return (
+            f"{limit:.3g} % of the area is lost between {ends[0]} and {ends[1]}{more}"
+        )
     at = {
         name: column[0]
         for name, column in curves(scenario, np.array(speeds[:1])).items()
@@ -551,7 +705,7 @@ def _loss(
     points = []
     for word, names in _LOST.items():
         shares = sorted(100.0 * at[name] for name in names if name in at)
-        if shares:
+        if any(abs(one) > 1e-9 for one in shares):
             low, high = f"{shares[0] + 0.0:.1f}", f"{shares[-1] + 0.0:.1f}"
             points.append(f"{word} {low}" if low == high else f"{word} {low} to {high}")
     order = (
@@ -559,4 +713,27 @@ def _loss(
     )
     others = [engineering(speed, "m/s") for speed in speeds[1:]]
     again = f"; again at {', '.join(others)}" if others else ""
-    return f"{limit:.3g} % lost at {engineering(speeds[0], 'm/s')}: {', '.join(points)} points{order}{again}"
+    return f"{limit:.3g} % lost at {engineering(speeds[0], 'm/s')}: {', '.join(points)} points{order}{again}{more}"
+
+
+def _masking(x: Array, work: Array, unit: str) -> str:
+    """Return in words between which numbers of an axis the effective work of adhesion falls to zero, "" if nowhere."""
+    masked = work <= 0.0
+    if not masked.any() or masked[0]:
+        return "; adhesion is masked everywhere in this figure" * bool(masked.all())
+    first = int(np.argmax(masked))
+    ends = [engineering(float(end), unit) for end in x[first - 1 : first + 1]]
+    return f"; adhesion becomes masked between {ends[0]} and {ends[1]}"
+
+
+def _peak(scenario: Scenario, x: Array, friction: Array) -> str:
+    """Return in words where friction is largest, "" if that is at an end of the speeds."""
+    place = int(np.argmax(friction))
+    if place in (0, len(x) - 1) or friction[place] < _CLEAR * friction[[0, -1]].max():
+        return ""
+    fine = np.geomspace(x[place - 1], x[place + 1], _POINTS)
+    values = curves(scenario, fine)["friction_force"]
+    # to the digits that the spacing of the speeds leaves
+    at = float(f"{fine[int(np.argmax(values))]:.2g}")
+    force = engineering(float(values.max()), "N")
+    return f"; friction is largest, {force}, at about {engineering(at, 'm/s')}"

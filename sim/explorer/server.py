@@ -26,17 +26,19 @@ from starlette.types import Receive, Scope, Send
 
 from sim.explorer.connection import Connection
 from sim.explorer.drawing import contact
-from sim.explorer.page import Page, Refused as BadValues
+from sim.explorer.page import Page, Refused as BadValues, stamp_of
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
 
 #: Bytes that a request may have, a table of 2 MB in it escaped; jobs at once.
 _MOST_BYTES, _MOST_JOBS = 4_200_000, 2
 _RUN = "/run"
+#: Addresses whose answers wait for no other ones.
+_PROMPT = ("/curves", "/motion", "/others", "/shown")
 #: Words of an address that are none of a slider, and most words of an address.
 _VIEW, _MOST_FIELDS = ("share", "absolute", "first", "loads", "figure"), 200
 #: Figures of a page; types of its files.
-_FIGURES = ("motion", "sweep", "speed")
+_FIGURES = ("motion", "sweep", "speed", "data", "spread", "map")
 _TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline'; connect-src 'self';"
@@ -52,14 +54,14 @@ class Query(BaseModel, extra="forbid", allow_inf_nan=False, strict=True):
     values: Annotated[dict[str, float | str], Field(max_length=100)] = {}
     share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
     loads: bool = False
-    figure: Literal["speed", "sweep"] = "speed"
+    figure: Literal["speed", "sweep", "motion", "data", "spread", "map"] = "speed"
     run: Annotated[str, Field(max_length=32)] = ""
     step: Annotated[int, Field(ge=0)] = 0
     data: str | None = None
     text: str = ""
     name: Annotated[str, Field(max_length=300)] = ""
     speed: Annotated[float, Field(gt=0.0, lt=1e6)] = 1.0
-    task: Literal["ensemble", "fit"] = "ensemble"
+    task: Literal["ensemble", "fit", "plan"] = "ensemble"
     members: Annotated[int, Field(ge=1, le=100_000)] = 1
     free: Annotated[list[str], Field(max_length=20)] = []
 
@@ -73,9 +75,10 @@ class Guarded:
 
     def __init__(self, page: Page, port: int, framed: bool = False) -> None:
         self.token = secrets.token_urlsafe(32)
+        self._refused = ""  # stamp of a file that could not be read
         self._page, self._locks = (
             page,
-            {path: threading.Lock() for path in ("/curves", "/motion", "")},
+            {path: threading.Lock() for path in (*_PROMPT, "")},
         )
         self._hosts = {f"{name}:{port}".encode() for name in ("127.0.0.1", "localhost")}
         static = Path(__file__).with_name("static").iterdir()
@@ -91,22 +94,30 @@ class Guarded:
             "cache-control": "no-store",
         }
         self._answers: dict[str, Callable[[Query], Any]] = {
-            "/start": lambda query: page.start(),
-            "/curves": lambda query: page.answer(
+            "/start": lambda query: self._page.start(),
+            "/curves": lambda query: self._page.answer(
                 query.values, query.share, query.figure, query.data
             ),
-            "/others": lambda query: page.others(
+            "/others": lambda query: self._page.others(
                 query.values, query.figure, query.loads
             ),
-            "/motion": lambda query: page.motions.advance(
-                page.read(query.values), query.run, query.step
+            "/shown": lambda query: self._page.figure(
+                query.values, query.figure, query.data
             ),
-            "/words": lambda query: page.words(query.values),
-            "/band": lambda query: page.band(query.values),
-            "/contact": lambda query: contact(page.read(query.values), query.speed),
-            "/data": lambda query: {"data": page.add(query.text, query.name)},
-            "/toml": lambda query: {"text": page.toml(query.values)},
-            "/csv": lambda query: {"text": page.csv(query.values)},
+            "/motion": lambda query: self._page.motions.advance(
+                self._page.read(query.values), query.run, query.step
+            ),
+            "/words": lambda query: self._page.words(query.values),
+            "/band": lambda query: self._page.band(query.values),
+            "/contact": lambda query: contact(
+                self._page.read(query.values), query.speed
+            ),
+            "/data": lambda query: {"data": self._page.add(query.text, query.name)},
+            "/file": lambda query: self._followed(),
+            "/difference": lambda query: self._page.difference(query.values),
+            "/write": lambda query: self._page.write(query.values, query.text),
+            "/toml": lambda query: {"text": self._page.toml(query.values)},
+            "/csv": lambda query: {"text": self._page.csv(query.values)},
         }
         self._places, self._jobs = asyncio.Semaphore(_MOST_JOBS), set[Process]()
 
@@ -135,21 +146,30 @@ class Guarded:
         answer.headers.update(self._headers)
         await answer(scope, receive, send)
 
+    def _followed(self) -> dict[str, str]:
+        """Return the stamp of the scenario's file, whose page takes the place of that of an earlier one."""
+        page = self._page
+        stamp = stamp_of(Path(page.path))
+        if stamp not in ("", page.stamp, self._refused):
+            try:
+                self._page = page.renewed()
+            except BadInput:
+                self._refused = stamp
+                raise
+        return {"stamp": self._page.stamp}
+
     def _task(self, query: Query) -> tuple[list[str], bytes]:
         """Return the command of the job that is asked for, and what it reads."""
-        from sim.explorer.job import command, ensemble, fitted
+        from sim.explorer.job import command, ensemble, fitted, planned
 
         if query.task == "ensemble":
-            return command(
-                functools.partial(
-                    ensemble, self._page.scenes(query.values, query.members)
-                )
-            )
+            scenes = self._page.scenes(query.values, query.members)
+            return command(functools.partial(ensemble, scenes, describes=True))
         if (table := self._page.tables.get(query.data)) is None or not query.free:
             raise Refused(400, "a fit needs a table and numbers that are free")
-        return command(
-            functools.partial(fitted, self._page.read(query.values), table, query.free)
-        )
+        task = fitted if query.task == "fit" else planned
+        scene = self._page.read(query.values)
+        return command(functools.partial(task, scene, table, query.free))
 
     async def _stream(
         self, query: Query, scope: Scope, receive: Receive, send: Send
@@ -230,7 +250,7 @@ class Guarded:
             raise Refused(403, "no JSON")
 
     def _answer(self, path: str, query: Query) -> Any:
-        # curves and motions wait for no slow answer; the rest take turns, because their first ones import modules
+        # the rest take turns, because their first ones import modules
         with self._locks[path if path in self._locks else ""]:
             return self._answers[path](query)
 
@@ -311,7 +331,7 @@ def _import_answers() -> None:
 
     Imports compile sources, and CPython 3.11 raises a SystemError if several threads convert syntax trees at once.
     """
-    for name in ("scipy.optimize", "sim.explorer.job"):
+    for name in ("scipy.optimize", "sim.explorer.job", "sim.study.fit"):
         importlib.import_module(name)
 
 

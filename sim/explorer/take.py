@@ -17,9 +17,12 @@ from sim.units.quantity import Quantity
 
 
 def toml(
-    scenario: Scenario, changed: Mapping[str, float], fixed: Mapping[str, Any]
+    scenario: Scenario,
+    changed: Mapping[str, float],
+    fixed: Mapping[str, Any],
+    is_swept: bool = False,
 ) -> str:
-    """Return a scenario as TOML with some numbers changed [SI], and without its sweep.
+    """Return a scenario as TOML with some numbers changed [SI], and without its sweep unless it ``is_swept``.
 
     The comments of its file stay. ``fixed`` are values of keys that its file does not have: those of an option. A
     scenario that was made in Python is written as it was resolved.
@@ -33,7 +36,8 @@ def toml(
         )
         return written(document)
     result, known = tomlkit.parse(text), quantities(scenario)
-    result.pop("sweep", None)
+    if not is_swept:
+        result.pop("sweep", None)
     fixed = {
         key: value for key, value in fixed.items() if key.partition(".")[0] != "sweep"
     }

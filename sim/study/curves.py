@@ -78,10 +78,13 @@ def steady_curves(scenario: Scenario, speeds: Array, time: float = 0.0) -> "xr.D
     return result
 
 
-def speeds_of_loss(scenario: Scenario, share: float, speeds: Array) -> list[float]:
+def speeds_of_loss(
+    scenario: Scenario, share: float, speeds: Array, ratio: Array | None = None
+) -> list[float]:
     """Return the speeds [m/s] in steady sliding at which a share of JKR's area is lost, between some speeds.
 
-    Each crossing between two neighbours of ``speeds``, which grow, is solved to rounding in the logarithm of the speed.
+    ``ratio`` is the curve of the area over JKR's at these speeds, if it is known. Each crossing between two neighbours
+    of ``speeds``, which grow, is solved to rounding in the logarithm of the speed.
     """
     from scipy import optimize
 
@@ -90,7 +93,9 @@ def speeds_of_loss(scenario: Scenario, share: float, speeds: Array) -> list[floa
             1.0 - share
         )
 
-    left = curves(scenario, speeds)["area_ratio"] - (1.0 - share)
+    if ratio is None:
+        ratio = curves(scenario, speeds)["area_ratio"]
+    left = ratio - (1.0 - share)
     places = np.flatnonzero((left[:-1] > 0.0) != (left[1:] > 0.0))
     ends: Sequence[tuple[float, float]] = [
         (np.log(speeds[k]), np.log(speeds[k + 1])) for k in places

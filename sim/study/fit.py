@@ -678,68 +678,91 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     If tables have values of their own, each has its own colours. Over time, speed and mount the curve is steady sliding
     at many places. Runs, and scenarios that differ in another key, are too expensive for that: a thin line joins them.
     """
-    fitted, alone = problem.predicted(best.x), problem.steady(best.x)
-    off = problem.residuals(best.x)
-    along = [_along(table) for table in problem.tables]
-    conditions, labels = _alike(problem)
+    panels = dict[tuple[str, str], list[Course]]()
+    every, labels = courses(problem, best.x)
+    for course in every:
+        panels.setdefault((course.name, course.along.key), []).append(course)
     colours = style.shades(len(labels))
-    panels = dict[tuple[str, str], list[int]]()
-    for number, (table, name) in enumerate(problem.curves):
-        panels.setdefault((name, along[table].key), []).append(number)
-    is_joined = {
-        key: problem.is_rough or key not in likelihood.COURSES for _, key in panels
-    }
     with mpl.rc_context(style.STYLE):
         picture, axes = style.rows([_CURVES, _RESIDUALS] * len(panels), shared=False)
-        for k, ((name, key), numbers) in enumerate(panels.items()):
+        for k, ((name, _), drawn) in enumerate(panels.items()):
             upper, lower = axes[2 * k : 2 * k + 2]
-            tables = [problem.curves[number][0] for number in numbers]
-            every = np.concatenate([along[table].values for table in tables])
-            scale, axis = style.axis_scale(every), along[tables[0]]
-            x = Unit.of(every, axis.unit, scale == "log")
+            places = np.concatenate([course.x for course in drawn])
+            scale, axis = style.axis_scale(places), drawn[0].along
+            x = Unit.of(places, axis.unit, scale == "log")
             definition = QUANTITIES[name]
             y = Unit.of(problem.values[problem.of(name)], definition.unit)
-            for number, table in zip(numbers, tables, strict=True):
-                first = np.argmax(problem.curve == number)
-                values = along[table].values
-                order = np.argsort(values, kind="stable")
-                for condition in np.unique(conditions[table]):
-                    rows = order[conditions[table][order] == condition]
-                    at, over = first + rows, x.factor * values[rows]
-                    measured, errors = (
-                        y.factor * problem.values[at],
-                        y.factor * problem.sigma[at],
-                    )
-                    look: Any = {"color": colours[condition]}
-                    bars = HOLLOW | look | {"elinewidth": 0.7, "zorder": 3}
-                    upper.errorbar(over, measured, errors, **bars)
-                    lower.plot(over, off[at], **HOLLOW, **look)
-                    fine, smooth = values[rows], alone[at]
-                    if not is_joined[key] and fine[0] < fine[-1]:
-                        along_rows = key, rows
-                        fine, smooth = problem.between(best.x, table, name, along_rows)
-                    # what is added to steady sliding is known at the rows
-                    added = np.interp(fine, values[rows], fitted[at] - alone[at])
-                    look |= _FITS[is_joined[key]][1] | {"zorder": 2}
-                    look["marker"] = "" if np.ptp(over) else "x"
-                    upper.plot(x.factor * fine, y.factor * (smooth + added), **look)
+            for course in drawn:
+                over, measured = x.factor * course.x, y.factor * course.values
+                look: Any = {"color": colours[course.label]}
+                bars = HOLLOW | look | {"elinewidth": 0.7, "zorder": 3}
+                upper.errorbar(over, measured, y.factor * course.errors, **bars)
+                lower.plot(over, course.residuals, **HOLLOW, **look)
+                look |= _FITS[course.is_joined][1] | {"zorder": 2}
+                look["marker"] = "" if np.ptp(over) else "x"
+                upper.plot(x.factor * course.fine, y.factor * course.smooth, **look)
             meaning = definition.meaning.partition(",")[0]
             upper.set_ylabel(y.label(f"{meaning} ${definition.symbol}$"))
             upper.tick_params(labelbottom=False)
             lower.axhline(0.0, **style.GUIDE)
             lower.margins(y=0.15)
             lower.set_ylabel("residual ($\\sigma$)")
-            style.across(upper, x.factor * every, "", scale, 0.05)
-            style.across(lower, x.factor * every, x.label(axis.words), scale, 0.05)
+            style.across(upper, x.factor * places, "", scale, 0.05)
+            style.across(lower, x.factor * places, x.label(axis.words), scale, 0.05)
         axes[0].plot([], [], label="measured", color=BOTH, **HOLLOW)
         for joined, (words, look) in _FITS.items():
-            if joined in is_joined.values():
+            if joined in {course.is_joined for course in every}:
                 axes[0].plot([], [], label=words, color=BOTH, **look)
         named = np.linspace(0, len(labels) - 1, _NAMED).astype(int)
         for k in np.unique(named) if len(labels) > 1 else ():
             axes[0].plot([], [], color=colours[k], label=labels[k])
         style.legend(axes[0])
     return picture
+
+
+class Course(NamedTuple):
+    """Points of one variable in one table that share all conditions but the one along which they are drawn [SI].
+
+    ``x`` grows, and ``errors`` are standard errors. Residuals are in standard errors. ``fine`` and ``smooth`` are the
+    predicted curve, which ``is_joined`` if it is known at the points alone. ``label`` is the number of the conditions.
+    """
+
+    name: str
+    along: Along
+    label: int
+    x: Array
+    values: Array
+    errors: Array
+    residuals: Array
+    fine: Array
+    smooth: Array
+    is_joined: bool
+
+
+def courses(problem: Problem, x: Array) -> tuple[list[Course], list[str]]:
+    """Return the courses of all measured curves with their prediction, and the labels of their conditions."""
+    fitted, alone, off = problem.predicted(x), problem.steady(x), problem.residuals(x)
+    conditions, labels = _alike(problem)
+    result = []
+    for number, (table, name) in enumerate(problem.curves):
+        along = _along(problem.tables[table])
+        is_joined = problem.is_rough or along.key not in likelihood.COURSES
+        first = np.argmax(problem.curve == number)
+        order = np.argsort(along.values, kind="stable")
+        for condition in np.unique(conditions[table]):
+            rows = order[conditions[table][order] == condition]
+            at, places = first + rows, along.values[rows]
+            fine, smooth = places, alone[at]
+            if not is_joined and fine[0] < fine[-1]:
+                fine, smooth = problem.between(x, table, name, (along.key, rows))
+            # what is added to steady sliding is known at the rows
+            added = np.interp(fine, places, fitted[at] - alone[at])
+            points = problem.values[at], problem.sigma[at], off[at]
+            course = Course(
+                name, along, condition, places, *points, fine, smooth + added, is_joined
+            )
+            result.append(course)
+    return result, labels
 
 
 def _along(table: Measured) -> Along:

@@ -249,12 +249,13 @@ class _Design:
 
 def plan(
     scenario: Scenario,
-    points: Path,
+    points: Path | Measured,
     free: Iterable[str],
     candidates: Path | None = None,
     common: dict[str, float] | None = None,
     sims: int = SIMS,
     seed: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Plan:
     """Return what a planned measurement can tell.
 
@@ -262,7 +263,7 @@ def plan(
     ----------
     scenario : Scenario
         The truth that is assumed; its sweep is left out.
-    points : Path
+    points : Path or Measured
         CSV table of conditions and standard errors, ``speed [mm/s], contact_area_error [%]``. Its measured values, if
         there are any, are not used.
     free : iterable of str
@@ -276,6 +277,8 @@ def plan(
         Simulated data sets for each truth.
     seed : int, optional
         Of the simulated errors, by default that of the scenario.
+    progress : callable, optional
+        Takes the steps of the plan that are done, and all of them, in place of a bar.
 
     Raises
     ------
@@ -301,7 +304,8 @@ def plan(
     numbers = [fits.free_number(base, text) for text in free]
     table = _read(points, base)
     if not all(np.isnan(item.values).all() for item in table.curves):
-        remarks.append(f"{points}: measured values are not used; a plan predicts them")
+        name = table.path
+        remarks.append(f"{name}: measured values are not used; a plan predicts them")
     if faults := [*fits.conflicts(base, numbers, [], [table])]:
         raise BadInput(faults)
     problem = _predicted(base, [table], numbers, common)
@@ -311,20 +315,28 @@ def plan(
         further = _rows(_read(candidates, base, table.names))
     if not further:
         remarks.append(
-            f"{points}: no column has the speed, so no further point is proposed; give --candidates"
+            f"{table.path}: no column has the speed, so no further point is proposed; give --candidates"
         )
     design = _Design(problem)
     if not design.parts:
         further, cause = [], "bonds or fluctuations do not act in the scenario as it is"
         remarks.append(f"no mechanisms are told apart, because {cause}")
     count = 1 + len(numbers) + len(further) + min(len(further), _BEST)
-    with progress_bar(count, "steps of the plan") as shown:
+    with progress_bar(count, "steps of the plan") as bar:
+        done = itertools.count(1)
+
+        def advance() -> None:
+            if progress is None:
+                bar.advance(1)
+            else:
+                progress(next(done), count)
+
         first = design.simulated(sims, seed)
-        shown.advance(1)
+        advance()
         expected, tried = list[Expected](), likelihood.tried_once(problem)
         for k in range(len(numbers)):
             expected.append(_interval(problem, k, first, tried))
-            shown.advance(1)
+            advance()
         ranked = list[tuple[Point, _Design]]()
         for row in further:
             tables = [table, _with_errors(row, problem)]
@@ -336,13 +348,13 @@ def plan(
                 {},
             )
             ranked.append((point, beside))
-            shown.advance(1)
+            advance()
         ranked.sort(key=lambda item: -sum(item[0].estimate.values()))
         proposed = [point for point, _ in ranked]
         for k, (point, beside) in enumerate(ranked[:_BEST]):
             chances = beside.simulated(sims, seed + 1 + k).probabilities
             proposed[k] = point._replace(probabilities=chances)
-            shown.advance(1)
+            advance()
     proposed.sort(
         key=lambda item: (
             -sum(chance.probability for chance in item.probabilities.values())
@@ -362,13 +374,18 @@ def plan(
     return result._replace(remarks=tuple(remarks))
 
 
-def _read(path: Path, scenario: Scenario, template: Sequence[str] = ()) -> Measured:
+def _read(
+    path: Path | Measured, scenario: Scenario, template: Sequence[str] = ()
+) -> Measured:
     """Return conditions and errors of a table. One without curves has the variables of a template, without errors."""
-    table = likelihood.read(path, scenario, template or ["contact_area"])
+    if isinstance(path, Measured):
+        table = path
+    else:
+        table = likelihood.read(path, scenario, template or ["contact_area"])
     for name, values, errors in table.curves:
         if errors is None and not (template and np.isnan(values).all()):
             cure = f'a plan needs them; add a column "{name}{ERROR} [%]" of numbers above 0'
-            raise BadInput([f"{path}: {name} has no standard errors; {cure}"])
+            raise BadInput([f"{table.path}: {name} has no standard errors; {cure}"])
     return table
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import psutil
 import pytest
 from helpers.commands import COUNTED, LENS, RAMP
+from helpers.firefox import firefox
 from numpy.testing import assert_allclose
 
 import sim
@@ -29,6 +30,7 @@ CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
     "",
 )
+FIREFOX = next(filter(None, map(shutil.which, ("firefox-esr", "firefox"))), "")
 pytestmark = [
     pytest.mark.verify,
     pytest.mark.skipif(not CHROMIUM, reason="no Chromium"),
@@ -722,6 +724,163 @@ def test_the_flagship_of_stick_slip_opens_with_slips_that_go_on_under_a_new_numb
         assert page.locator("#plot [data-name=changed]").count()
 
 
+def test_a_click_on_the_map_of_stability_plays_that_point(browser):
+    with scenario(browser, "stability_map") as page:
+        page.wait_for_selector("#plot [data-name='V grows 0 20']")
+        softest = page.evaluate("explored.start.points[0]['drive.stiffness']")
+        page.evaluate(
+            """document.querySelector("[data-name='V grows 0 20']")
+            .dispatchEvent(new MouseEvent("click", { bubbles: true }))"""
+        )
+        motion = (
+            "explored.view.figure === 'motion' && explored.motion.columns.t.length > 1"
+        )
+        wait(page, lambda: page.evaluate(motion), "no motion")
+        assert page.evaluate("explored.values['drive.stiffness']") == softest
+        # the stage has the speed of the cell after 20 of 24 equal factors within 4 s
+        time = page.evaluate("explored.motion.time")
+        assert 4.0 * 20.0 / 24.0 - 0.01 < time < 4.0 * 21.0 / 24.0
+        page.locator("#undo").click()
+        assert page.evaluate("explored.values['drive.stiffness']") == 100.0
+        assert page.evaluate("explored.view.figure") == "map"
+
+
+def test_a_long_trace_shows_all_slips(browser):
+    with scenario(browser, "stability_map", reduced_motion="reduce") as page:
+        page.get_by_label("the motion", exact=True).check()
+        wait(page, lambda: lost(page).startswith("First member, 8 s"), "no motion")
+        idle(page)
+        forces = np.array(page.evaluate("explored.motion.columns.spring_force"))
+        path = page.locator("#plot [data-name=spring_force]").get_attribute("d")
+        points = np.array(re.findall(r"([\d.]+) ([\d.]+)", path), float)
+        # least and largest force of each column of pixels, from the records
+        axis = (points[:, 0].min(), points[:, 0].max())
+        x = np.interp(np.arange(len(forces)), [0, len(forces) - 1], axis)
+        top, bottom = points[:, 1].min(), points[:, 1].max()
+        up = np.interp(forces, [forces.min(), forces.max()], [bottom, top])
+        for column in range(int(axis[0]) + 1, int(axis[1])):
+            here = up[np.floor(x) == column]
+            # places and heights of the path have one decimal
+            near = np.abs(points[:, 0] - column - 0.5) <= 0.56
+            seen = points[near, 1]
+            assert seen.max() >= here.max() - 0.1 and seen.min() <= here.min() + 0.1
+
+
+def test_a_share_lost_at_every_speed_and_an_open_contact_are_said(browser):
+    with scenario(browser, "own_map") as page:
+        page.get_by_label("over the sliding speed").check()
+        idle(page)
+        curves = page.evaluate("explored.answers.curves.answer.curves")
+        least = 100.0 * (1.0 - max(curves["area_ratio"]))
+        assert least > 10.0
+        assert f"at every speed shown: {least:.3g}" in lost(page)
+    with scenario(browser, "afm_tip") as page:
+        idle(page)
+        assert "open" not in lost(page)
+        enter(page, "-1 uN", LOAD)  # beyond the pull-off of any range
+        page.get_by_label("over the sliding speed").check()
+        idle(page)
+        assert "contact is open" in lost(page)
+
+
+def test_stars_mark_the_numbers_that_change_the_drawn_share_most(browser):
+    with scenario(browser, "pdms_lens") as page:
+        idle(page)
+        marked = page.evaluate(
+            """[...document.querySelectorAll(".slider label")]
+            .filter((label) => label.textContent.startsWith("★")).map((label) => label.htmlFor)"""
+        )
+    scene = sim.load("scenarios/pdms_lens.toml").with_values({})
+    speeds = Page(scene).speeds
+    before, effects = steady(scene, speeds)["area_ratio"], {}
+    for key in (*marked, RADIUS, "solid.poisson_ratio", "adhesion.work"):
+        number, effects[key] = quantities(scene)[key][1], 0.0
+        for change in (-0.1, 0.1):
+            with contextlib.suppress(sim.BadInput):  # beyond the bound of a share
+                other = scene.with_values({key: number + change * (number or 1.0)})
+                off = steady(other, speeds)["area_ratio"] - before
+                effects[key] = max(effects[key], np.max(np.abs(off)))
+    assert len(marked) == 3 and RADIUS not in marked
+    assert min(effects[key] for key in marked) >= max(
+        effect for key, effect in effects.items() if key not in marked
+    )
+
+
+def test_a_band_that_was_slow_follows_later_moves_again(random):
+    idle(random)
+    assert random.locator("#plot [data-name=own]").count()
+    slow = {"reason": "eight members take too long to follow the sliders"}
+    random.route("**/band", lambda route: route.fulfill(json=slow))
+    enter(random, "8 mN", LOAD)
+    wait(random, lambda: "too long" in random.locator("#ran").text_content(), "no word")
+    assert not random.locator("#plot [data-name=own]").count()
+    random.unroute("**/band")
+    enter(random, "6 mN", LOAD)
+    idle(random)
+    assert random.locator("#plot [data-name=own]").count()
+    assert "too long" not in random.locator("#ran").text_content()
+
+
+def test_the_page_follows_the_file_and_writes_back_after_it_shows_the_difference(
+    browser, lens
+):
+    with explored(lens) as (_, address), opened(browser, address) as page:
+        enter(page, "3 mm")
+        idle(page)
+        page.locator("#save summary").click()
+        page.get_by_text("write back").click()
+        shown = page.locator("#change pre")
+        wait(page, lambda: '+radius = "3 mm"' in shown.text_content(), "no difference")
+        assert 'radius = "2 mm"' in lens.read_text(encoding="utf-8")
+        page.locator("#cancel").click()
+        assert not page.locator("#change").is_visible()
+        page.locator("#save [data-kind=difference]").click()
+        page.locator("#write").click()
+        wait(page, lambda: RADIUS not in page.url, "the file has another number")
+        settled(page)
+        idle(page)
+        assert 'radius = "3 mm"' in lens.read_text(encoding="utf-8")
+        assert value(page) == "3 mm" and page.locator("#reset").is_disabled()
+        # a file that is saved by another program is shown, one with a fault is named
+        text = lens.read_text(encoding="utf-8").replace('"3 mm"', '"4 mm"')
+        lens.write_text(text, encoding="utf-8")
+        wait(page, lambda: value(page) == "4 mm", "the page does not follow")
+        settled(page)
+        lens.write_text(text.replace('"4 mm"', '"4 kg"'), encoding="utf-8")
+        trouble = page.locator("#trouble")
+        wait(page, lambda: "kg" in trouble.text_content(), "the fault is not named")
+        assert value(page) == "4 mm"
+
+
+def test_a_fit_has_a_band_over_residuals_and_the_last_run_a_paragraph(browser):
+    looks = {"permissions": ["clipboard-read", "clipboard-write"]}
+    with scenario(browser, "measured_lens", **looks) as page:
+        idle(page)
+        assert "tick the numbers" in lost(page)
+        for key in ("bonds.critical_speed", "bonds.stress"):
+            page.locator(f"#free input[value='{key}']").check()
+        page.locator("#fit").click()
+        wait(page, lambda: page.locator("#fitted").is_visible(), "no fit")
+        idle(page)
+        assert "tick the numbers" not in lost(page)
+        assert page.locator("#plot [data-name=draws]").count() == 2
+        assert page.locator("#plot [data-name=residual]").count() == 20
+        enter(page, "3 mm")
+        idle(page)
+        assert page.locator("#plot [data-name=draws]").count() == 0
+        page.locator("#copy summary").click()
+        page.locator("#copy [data-what=methods]").click()
+        wait(
+            page, lambda: "first" in page.locator("#trouble").text_content(), "no word"
+        )
+        page.locator("#run").click()
+        wait(page, lambda: page.evaluate("explored.run !== null"), "no run")
+        page.locator("#copy [data-what=methods]").click()
+        wait(page, lambda: page.locator("#copied").text_content(), "not copied")
+        text = page.evaluate("navigator.clipboard.readText()")
+        assert "sphere" in text and "@" in text and "3 mm" in text
+
+
 def test_a_slider_beyond_its_partner_is_undone_whole(browser):
     key = "shear.spectrum.shortest"
     with scenario(browser, "pdms_lens") as page:
@@ -1079,13 +1238,32 @@ class Walk:
         assert facts["bars"] == (facts["fitted"] if facts["isFitOf"] else 0)
 
 
+@contextlib.contextmanager
+def opened_in(engine, request, address):
+    """A page in Chromium, or in Firefox by a driver of our own."""
+    if engine == "chromium":
+        with opened(request.getfixturevalue("browser"), address) as page:
+            yield page
+        return
+    if not FIREFOX:
+        pytest.skip("no Firefox")
+    with firefox(FIREFOX) as page:
+        page.goto(address)
+        settled(page)
+        yield page
+
+
 @pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("engine", ["chromium", "firefox"])
 def test_after_any_gesture_all_that_is_shown_belongs_to_the_same_numbers(
-    browser, tmp_path, seed
+    request, tmp_path, engine, seed
 ):
     path = tmp_path / "random.toml"
     path.write_text(LENS + RAMP + COUNTED + WAVES, encoding="utf-8")
-    with explored(path) as (_, address), opened(browser, address) as page:
+    with (
+        explored(path) as (_, address),
+        opened_in(engine, request, address) as page,
+    ):
         walk = Walk(page, path, seed)
         for _ in range(GESTURES):
             walk.gesture()

@@ -15,12 +15,14 @@ from numpy.testing import assert_allclose
 import sim
 from sim.explorer import take
 from sim.explorer.drawing import contact
-from sim.explorer.job import ensemble
+from sim.explorer.figures import rings
+from sim.explorer.job import ensemble, fitted
 from sim.explorer.page import Page, Refused, previews
 from sim.explorer.server import Server, state_of
 from sim.laws import jkr
 from sim.parts.shear import models
 from sim.study.curves import curves, speeds_of_loss
+from sim.study.likelihood import problem_of
 
 SCENARIOS = (
     "pdms_lens",
@@ -144,7 +146,7 @@ def test_sliders_are_numbers_that_change_a_curve_between_ends_within_their_bound
     assert not {
         key for key in keys if key.startswith(("clock", "ensemble", "record", "seed"))
     }
-    moves = page.figures[0] == "motion"
+    moves = "motion" in page.figures
     assert any(key.startswith("drive.") for key in keys) == moves
     assert ("bonds.critical_speed" in keys) == (
         name in ("pdms_lens", "masking") and name != "masking"
@@ -353,15 +355,16 @@ def test_the_sentence_says_so_if_a_share_is_lost_everywhere_or_the_contact_is_op
     # Hertz's contact at all speeds, so that both ends are the same number
     assert np.ptp(lost) < 1e-9
     place = "10 % or more of the area is lost at every speed shown"
-    assert words(masked) == f"{place}: {lost.min():.3g} %"
+    everywhere = "; adhesion is masked everywhere in this figure"
+    assert words(masked) == f"{place}: {lost.min():.3g} %{everywhere}"
     wide = {"shear.spectrum.rms": 1.3e5}
     lost = 100.0 * (1.0 - curves(page.read(wide), page.speeds)["area_ratio"])
-    assert words(wide, 0.05) == (
+    assert words(wide, 0.05).startswith(
         place.replace("10", "5", 1) + f": {lost.min():.3g} to {lost.max():.3g} %"
     )
     assert "open everywhere" in words({"contact.load": -0.1})
     alone = {"shear.paid_by_adhesion": 0.0, "adhesion.bond_share": 0.0}
-    assert words(alone) == "No area is lost at any speed shown"
+    assert words(alone) == "With these numbers no area is lost at any speed shown"
     most = 100.0 * (1.0 - np.nanmin(curves(page.scenario, page.speeds)["area_ratio"]))
     assert f"at most {most:.3g} %" in words({}, 0.9)
 
@@ -381,7 +384,7 @@ def test_marks_rank_numbers_by_the_drawn_share_of_the_area():
 
 def test_a_figure_over_a_sweep_has_the_curves_of_its_points():
     page = Page(sim.load("scenarios/masking.toml"))
-    assert page.figures == ["sweep", "speed"]
+    assert page.figures == ["sweep", "speed", "data"]
     answer = page.answer({}, 0.1, "sweep")
     assert len(answer["x"]) == 41 and answer["axis"]["unit"][1] == "kPa"
     for place in (0, 20, 40):
@@ -397,12 +400,215 @@ def test_a_figure_over_a_sweep_has_the_curves_of_its_points():
 
 @pytest.mark.parametrize(
     ("name", "figure"),
-    [("stick_slip", "motion"), ("pull_off", "motion"), ("pdms_lens", "speed")],
+    [
+        ("stick_slip", "motion"),
+        ("pull_off", "motion"),
+        ("jkr_test", "motion"),  # its table is the course of the load
+        ("own_map", "motion"),
+        ("stability_map", "map"),
+        ("jkr_fit", "data"),
+        ("incipient_fit", "data"),
+        ("own_psd", "sweep"),
+        ("ten_wavelengths", "spread"),
+        ("pdms_lens", "speed"),
+    ],
 )
 def test_a_page_opens_with_the_figure_of_what_its_scenario_computes(name, figure):
     page = Page(sim.load(f"scenarios/{name}.toml"))
     start = page.start()
     assert start["figures"][0] == figure and start["question"].endswith("?")
+
+
+def test_a_table_beside_its_scenario_is_drawn_over_what_varies_with_its_residuals():
+    page = Page(sim.load("scenarios/jkr_fit.toml"))
+    work, modulus, radius = 45e-3, 1.5e6, 2e-3
+    start = page.start()
+    values = {"adhesion.work": work, "solid.youngs_modulus": modulus}
+    answer = page.figure(values, "data", start["data"])
+    curves, residuals = (panel["marks"] for panel in answer["panels"])
+    model, points = curves
+    load, size = 1e-3 * np.array(model["x"]), 1e-6 * np.array(model["y"])
+    # JKR's load of a contact radius, and the residuals of the measured radii
+    reduced = modulus / 0.75
+    exact = 4.0 * reduced * size**3 / (3.0 * radius)
+    exact -= np.sqrt(8.0 * np.pi * work * reduced * size**3)
+    assert_allclose(load, exact, rtol=1e-9, atol=1e-9 * load.max())
+    off = np.array(residuals[0]["y"])
+    errors = np.array(points["high"])
+    at = 1e-3 * np.array(points["x"])
+    predicted = 1e6 * np.interp(at, load, size)  # the curve is bent between its places
+    measured = np.array(points["y"])
+    assert_allclose(off * errors, measured - predicted, atol=1e-3 * size.max() * 1e6)
+    compared = page.answer(values, 0.1, table=start["data"])["data"]
+    assert f"χ² = {compared['chi_square']:.4g} for 14" in answer["words"]
+    assert_allclose(np.sum(off**2), compared["chi_square"], rtol=1e-9)
+    assert "tick the numbers" not in answer["words"]
+    assert "tick the numbers" in page.figure({}, "data", start["data"])["words"]
+
+
+def test_a_table_without_errors_has_no_residuals(lens):
+    page = Page(sim.load(lens))
+    table = page.add("speed [mm/s],contact_area [mm^2]\n1,0.04\n9,0.03\n", "own.csv")
+    answer = page.figure({}, "data", table)
+    assert len(answer["panels"]) == 1 and "no χ²" in answer["words"]
+    assert page.figure({}, "data", None)["panels"] == []
+
+
+def test_the_spread_of_the_members_is_that_of_runs_of_the_sweep():
+    scene = sim.load("scenarios/ten_wavelengths.toml", {"ensemble.members": 200})
+    answer = Page(scene).figure({}, "spread")
+    run = sim.run(scene).isel(t=-1)
+    share = 100.0 * run["contact_area"] / (np.pi * run["jkr_radius"] ** 2)
+    for mean, width in zip(
+        share.mean("member").to_numpy(),
+        share.std("member", ddof=1).to_numpy(),
+        strict=True,
+    ):
+        assert f"{mean:.3g} ± {width:.2g} %" in answer["words"]
+    for mark in answer["panels"][0]["marks"]:
+        x, y = np.array(mark["x"]), np.array(mark["y"])
+        # the whole of the members is below each curve
+        assert_allclose(np.sum(np.diff(x) * y[:-1]), 100.0, rtol=1e-12)
+
+
+def test_the_map_of_stability_has_the_swings_of_runs_and_plays_their_moments():
+    changes = {"sweep": {"drive.stiffness": ["50 N/m", "1600 N/m"]}}
+    scene = sim.load("scenarios/stability_map.toml", changes)
+    page = Page(scene)
+    assert page.figure({}, "map")["more"]
+    answer = page.figure({}, "map")
+    assert not answer["more"] and "up to 50 N/m" in answer["words"]
+    run = sim.run(scene)
+    grows = answer["panels"][0]["marks"]
+    assert len(answer["panels"]) == 2 and len(grows) == 48
+    for mark in grows:
+        play = answer["plays"][mark["name"]]
+        at = run.sel(drive_stiffness=play["values"]["drive.stiffness"])
+        at = at.isel(t=slice(0, at.sizes["t"] // 2 + 1))
+        low, high = (1e-3 * x for x in mark["x"])
+        here = at.isel(t=(at["stage_speed"] >= low) & (at["stage_speed"] < high))
+        force = here["spring_force"].to_numpy()
+        swing = 1.0 - force.min() / force.max()
+        assert_allclose(mark["opacity"], max(0.02, 0.9 * swing), atol=0.02)
+        assert (
+            low * 0.999 <= float(at["stage_speed"].sel(t=play["time"])) <= high * 1.001
+        )
+    hard = [
+        m for m in grows if answer["plays"][m["name"]]["values"]["drive.stiffness"] > 60
+    ]
+    assert (
+        max(mark["opacity"] for mark in hard) < 0.45 < max(m["opacity"] for m in grows)
+    )
+    assert Page(sim.load("scenarios/stick_slip.toml")).figures[0] == "motion"
+
+
+def test_motions_at_other_points_of_the_sweep_keep_the_extremes_of_their_runs():
+    scene = sim.load("scenarios/pull_off.toml")
+    others = Page(scene).others({}, "motion")["others"]
+    run = sim.run(
+        sim.load("scenarios/pull_off.toml", {"clock.record": scene.clock.step})
+    )
+    assert [one["label"] for one in others] == [
+        "k = 34 N/m",
+        "k = 3.4 kN/m",
+        "k = 34 kN/m",
+    ]
+    for one, stiffness in zip(others, (34.0, 3400.0, 34000.0), strict=True):
+        load = np.array(one["columns"]["normal_load"])
+        exact = run["normal_load"].sel(contact_stiffness=stiffness)
+        assert_allclose([load.min(), load.max()], [exact.min(), exact.max()], rtol=1e-5)
+        assert len(load) < 3000
+    # the present point has no twin, and a number that is no point leaves all of them
+    labels = [
+        one["label"]
+        for one in Page(scene).others({"contact.stiffness": 34.0}, "motion")["others"]
+    ]
+    assert "k = 34 N/m" not in labels and "k = 340 N/m" in labels
+    bead = Page(sim.load("scenarios/soft_bead.toml")).others({}, "motion")["others"]
+    assert [one["label"] for one in bead] == ["profile = circle"]
+
+
+def test_the_sentence_names_where_adhesion_is_masked_and_friction_is_largest():
+    def words(name, values=()):
+        return Page(sim.load(f"scenarios/{name}.toml")).answer(dict(values), 0.1)[
+            "level"
+        ]["words"]
+
+    page = Page(sim.load("scenarios/masking.toml"))
+    answer = page.answer({}, 0.1, "sweep")
+    work = np.array(answer["curves"]["work_of_adhesion"])
+    first = int(np.flatnonzero(work <= 0.0)[0])
+    low, high = (1e-3 * answer["x"][k] for k in (first - 1, first))
+    assert (
+        f"masked between {low:.4g} kPa and {high:.4g} kPa" in answer["level"]["words"]
+    )
+    assert "masked" not in words("fixed_grips")
+    scene = sim.load("scenarios/friction_maximum.toml")
+    speeds = np.geomspace(1e-4, 1e-1, 20001)
+    force = curves(scene, speeds)["friction_force"]
+    assert f"{1e3 * force.max():.4g} mN" in words("friction_maximum")
+    assert f"about {1e3 * speeds[force.argmax()]:.2g} mm/s" in words("friction_maximum")
+    assert "largest" not in words("pdms_lens")
+
+
+def test_the_band_of_a_fit_holds_its_curve_and_is_as_wide_as_its_errors():
+    page = Page(sim.load("scenarios/measured_lens.toml"))
+    table = page.tables[page.start()["data"]]
+    free = ["bonds.critical_speed", "bonds.stress"]
+    answer = fitted(page.scenario, table, free, lambda message: None)
+    values = {key: number["value"] for key, number in answer["numbers"].items()}
+    shown = page.figure(values, "data", page.start()["data"])["panels"]
+    for band in answer["marks"]:
+        (panel,) = (one for one in shown if one.get("of") == band["of"])
+        line = panel["marks"][0]
+        low, middle, high = (np.array(y) for y in (band["y"], line["y"], band["high"]))
+        assert_allclose(band["x"], line["x"], rtol=1e-9)
+        assert np.all(low <= middle) and np.all(middle <= high)
+    # at low speed friction is the stress times an area that the fit leaves as it is
+    result = sim.fit(
+        "scenarios/measured_lens.toml", "scenarios/measured_lens.csv", free
+    )
+    error = result.errors["bonds.stress"] / result.values["bonds.stress"]
+    force = answer["marks"][1]
+    width = (force["high"][0] - force["y"][0]) / force["y"][0] / error
+    # the range of 30 normal draws is 4.09(69) standard deviations
+    assert abs(width - 4.09) < 4.0 * 0.69
+
+
+def test_rings_of_a_plan_are_on_the_curves_at_their_conditions():
+    page = Page(sim.load("scenarios/measured_lens.toml"))
+    problem = problem_of(page.scenario, [page.tables[page.start()["data"]]], [], {})
+    marks = rings(problem, [{"speed": 3e-3}])
+    exact = curves(page.scenario, np.array([3e-3]))
+    factors = {"contact_area": 1e6, "friction_force": 1e3}
+    assert [mark["of"] for mark in marks] == [*factors]
+    for mark in marks:
+        assert_allclose(mark["x"], [3.0], rtol=1e-12)
+        assert_allclose(mark["y"], factors[mark["of"]] * exact[mark["of"]], rtol=1e-9)
+
+
+def test_numbers_are_written_back_after_their_difference_and_the_page_follows_the_file(
+    tmp_path,
+):
+    path = tmp_path / "lens.toml"
+    text = LENS + '\n[sweep]\n"contact.load" = ["1 mN", "4 mN"]\n'
+    path.write_text(text, encoding="utf-8")
+    page = Page(sim.load(path))
+    with pytest.raises(sim.BadInput, match="already"):
+        page.difference({})
+    shown = page.difference({"sphere.radius": 3e-3})["difference"].splitlines()
+    changed = [line for line in shown if line[0] in "+-" and line[1] not in "+-"]
+    assert [line[0] for line in changed] == ["-", "+"] and "3 mm" in changed[1]
+    assert path.read_text(encoding="utf-8") == text
+    with pytest.raises(sim.BadInput, match="has changed meanwhile"):
+        page.write({"sphere.radius": 3e-3}, "1")
+    table = page.add("speed,contact_radius\n1,1.1e-4\n2,1e-4\n", "own.csv")
+    page.write({"sphere.radius": 3e-3}, page.stamp)
+    new = page.renewed()
+    assert new.scenario.sphere.radius == 3e-3 and len(new.start()["points"]) == 2
+    assert new.stamp != page.stamp and table in new.tables
+    with pytest.raises(sim.BadInput, match="no file of yours"):
+        Page(sim.load(tomllib.loads(LENS))).difference({"sphere.radius": 3e-3})
 
 
 def test_other_curves_are_those_of_the_other_points_of_a_sweep_and_of_other_loads():

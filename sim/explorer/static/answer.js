@@ -9,6 +9,10 @@ import { same } from "./state.js";
 /** @param {State} state */
 const drawn = ({ view }) => (view.figure === "sweep" ? "sweep" : "speed");
 
+/** Return true if the server describes the figure.
+ * @param {State} state */
+export const isDescribed = ({ view }) => ["data", "spread", "map"].includes(view.figure);
+
 /** Questions by the name of their answer, in the order in which they are asked.
  * @type {Record<string, (state: State) => any>} */
 export const QUESTIONS = {
@@ -19,11 +23,16 @@ export const QUESTIONS = {
     figure: drawn(state),
     data: state.table,
   }),
-  others: (state) => ({ values: state.values, figure: drawn(state), loads: state.view.loads }),
+  shown: (state) => isDescribed(state) && { values: state.values, figure: state.view.figure, data: state.table },
   words: (state) => ({ values: state.values }),
   contact: (state) => ({ values: state.values, speed: speedOf(state) }),
   // the first one imports modules for seconds
   band: (state) => ({ values: state.values }),
+  others: (state) => ({
+    values: state.values,
+    figure: state.view.figure === "motion" ? "motion" : drawn(state),
+    loads: state.view.loads,
+  }),
 };
 
 /** Addresses of the server that differ from the name of the answer. */
@@ -41,8 +50,8 @@ function speedOf(state) {
  * @param {State} state
  * @param {string} name */
 export function isCurrent(state, name) {
-  const found = state.answers[name];
-  return Boolean(found) && same(found.of, QUESTIONS[name](state));
+  const [found, question] = [state.answers[name], QUESTIONS[name](state)];
+  return !question || (Boolean(found) && same(found.of, question) && !found.answer.more);
 }
 
 /** Return the answer of a name if it belongs to the present numbers and has no faults, else null.
@@ -58,7 +67,8 @@ export function current(state, name) {
 export function due(state) {
   const names = Object.keys(QUESTIONS).filter((name) => !isCurrent(state, name));
   if (names.includes("curves")) return names.filter((name) => name === "before" || name === "curves");
-  return state.dragging ? names.filter((name) => name !== "words" && name !== "contact") : names;
+  const late = ["words", "contact", ...(state.view.figure === "motion" ? ["others"] : [])];
+  return state.dragging ? names.filter((name) => !late.includes(name)) : names;
 }
 
 /** Return in words how numbers differ from the present ones, such as "P = 4 mN"; "" if they do not.
@@ -78,8 +88,10 @@ export function differences({ start, values }, of) {
  * @param {State} state */
 export function nameOfRun(state) {
   if (!state.run) return "";
-  const { members } = state.run.answer;
   const other = differences(state, state.run.of.values);
-  const name = members > 1 ? `own models, mean of ${members}` : "own models";
-  return other ? `ran at ${other}` : name;
+  return other ? `ran at ${other}` : nameOf(state.run.answer.members);
 }
+
+/** Return what an ensemble of the present numbers is called.
+ * @param {number} members */
+export const nameOf = (members) => (members > 1 ? `own models, mean of ${members}` : "own models");

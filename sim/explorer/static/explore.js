@@ -154,7 +154,7 @@ const hash = () => new URLSearchParams(location.hash.slice(1));
 addEventListener("pagehide", () => {
   if (!state) return;
   const { table, run, fit, pin, past, future } = state;
-  store({ table, run, fit, pin, past, future });
+  store({ stamp: state.start.stamp, table, state: { run, fit, pin, past, future } });
 });
 
 // Sliders
@@ -254,6 +254,10 @@ addEventListener("keydown", (event) => {
 // The figure
 
 on("pin", "click", () => update(change.pinned(state)));
+on("plot", "click", ({ target }) => {
+  const point = state.answers.shown?.answer.plays?.[target.dataset.name];
+  if (point) update(change.begun(state, point));
+});
 on("at", "input", () => update({ ...state, reading: Number($("at").value) }));
 on("numbers", "toggle", () => update({ ...state }));
 on("play", "click", () => {
@@ -305,13 +309,19 @@ on("own", "submit", (event) => {
   job({ task: "ensemble", values: state.values, members });
 });
 on("stop", "click", () => stopper?.abort());
-on("data", "submit", (event) => {
-  event.preventDefault();
+/** Begin a fit or the plan of a measurement.
+ * @param {string} task */
+function compare(task) {
   const ticked = /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("#free input:checked"));
   const free = [...ticked].map(({ value }) => value);
   $("unfit").textContent = free.length ? "" : "tick the numbers to fit";
-  if (free.length) job({ task: "fit", values: state.values, data: state.table, free });
+  if (free.length) job({ task, values: state.values, data: state.table, free });
+}
+on("data", "submit", (event) => {
+  event.preventDefault();
+  compare("fit");
 });
+on("plan", "click", () => compare("plan"));
 on("use", "click", () => update(change.withFit(state)));
 
 /** Show a table of measured curves.
@@ -366,6 +376,11 @@ on("save", "click", async ({ target }) => {
   const { kind } = target.dataset;
   if (!kind) return;
   try {
+    if (kind === "difference") {
+      const { difference } = await ask(kind, { values: state.values });
+      $("change").querySelector("pre").textContent = difference;
+      return $("change").showModal();
+    }
     const isText = kind === "toml" || kind === "csv";
     const content = isText ? new Blob([(await ask(kind, { values: state.values })).text]) : await pictured(kind);
     const link = document.createElement("a");
@@ -378,14 +393,30 @@ on("save", "click", async ({ target }) => {
     complain(fault);
   }
 });
+on("cancel", "click", () => $("change").close());
+on("write", "click", async () => {
+  $("change").close();
+  try {
+    await ask("write", { values: state.values, text: state.start.stamp });
+    await follow();
+  } catch (fault) {
+    complain(fault);
+  }
+});
 on("copy", "click", async ({ target }) => {
   const { what } = target.dataset;
   if (!what) return;
   const words = new URLSearchParams(change.words(state)).toString();
   const path = state.start.path || "SCENARIO.toml";
-  const command = `sim explore ${path}${words ? ` --state '#${words}'` : ""}`;
+  const texts = {
+    link: shareable(words),
+    command: `sim explore ${path}${words ? ` --state '#${words}'` : ""}`,
+    methods: state.run?.answer.methods,
+  };
   try {
-    await navigator.clipboard.writeText(what === "link" ? shareable(words) : command);
+    const text = texts[/** @type {"link"} */ (what)];
+    if (!text) throw new Error("Run the scenario's own models first, at one point of the sweep");
+    await navigator.clipboard.writeText(text);
     $("copied").textContent = "copied";
     $("copy").open = false;
   } catch (fault) {
@@ -405,12 +436,28 @@ for (const id of ["save", "copy"]) {
 async function begin() {
   if (!authorised(hash())) throw new Error("This page has lost its key. Open the address that sim explore printed.");
   const start = await ask("start", {});
-  const first = { ...change.initial(start), ...stored() };
+  const kept = stored();
+  const first = { ...change.initial(start), ...(kept && { table: kept.table }) };
+  // of another text of the file only the table stays
+  if (kept?.stamp === start.stamp) Object.assign(first, kept.state);
   build(first);
   listen();
   const paused = change.withMotion(first, { paused: quiet.matches });
   update(change.linked(paused, hash()));
   rates(state, 0);
+  if (start.stamp) setInterval(follow, 1000);
+}
+
+/** Show the scenario's file as it is saved. */
+async function follow() {
+  if (document.hidden || asked.has("file")) return;
+  asked.add("file");
+  try {
+    if ((await ask("file", {})).stamp !== state.start.stamp) return location.reload();
+  } catch (fault) {
+    if (!state.trouble) complain(fault);
+  }
+  asked.delete("file");
 }
 
 begin().catch(complain);

@@ -7,12 +7,12 @@
 /** What a panel shows: `line`, `band` (between `y` and `high`), `points` (with errors), `rule` (at the places `x`), and
  * `image` (of the address `name` between the ends `x` and `y`).
  * @typedef {{ kind: "line" | "band" | "points" | "rule" | "image", x: Numbers, y: Numbers, high?: Numbers, colour: string,
- *   width?: number, dash?: string, opacity?: number, label?: string, name?: string }} Mark */
+ *   width?: number, size?: number, dash?: string, opacity?: number, label?: string, name?: string }} Mark */
 /** @typedef {{ x: Axis, y: Axis, height: number, marks: Mark[] }} Panel */
 /** @typedef {{ ink: string, soft: string, grid: string, back: string }} Theme */
 
 const FONT = "system-ui, sans-serif";
-const [LEFT, TOP, BOTTOM, GAP, LINE] = [62, 8, 40, 12, 14];
+const [LEFT, TOP, BOTTOM, GAP, LINE] = [70, 8, 40, 12, 14];
 
 /** Return an element of a figure.
  * @param {string} tag
@@ -62,7 +62,10 @@ export function axisOf(label, each, { log = false, zero = false, tight = false }
     }
   }
   if (!(low <= high)) [low, high] = log ? [0.1, 1] : [0, 1];
-  if (log) return { label, low, high: high > low ? high : 10 * low, log };
+  if (log) {
+    const edge = tight ? 1 : (high / low) ** 0.03;
+    return { label, low: low / edge, high: high > low ? high * edge : 10 * low, log };
+  }
   // noise smaller than a twentieth of the number does not fill a panel
   const least = 0.05 * Math.max(Math.abs(low), Math.abs(high)) || 1;
   const missing = Math.max(0, least - (high - low)) / 2;
@@ -89,7 +92,7 @@ export function ticks({ low, high, log }, count) {
   }
   const rough = (high - low) / Math.max(1, count);
   const size = 10 ** Math.floor(Math.log10(rough));
-  const step = size * ([1, 2, 5, 10].find((digit) => digit * size >= rough * 0.999) ?? 10);
+  const step = size * ([1, 2, 2.5, 5, 10].find((digit) => digit * size >= rough * 0.999) ?? 10);
   const between = (/** @type {number} */ width) => {
     const first = Math.ceil(low / width - 1e-9) + 0; // no −0
     const length = Math.floor(high / width + 1e-9) - first + 1;
@@ -243,7 +246,7 @@ function shapes(mark, right, up, ends) {
       ...about,
       cx: across.toFixed(1),
       cy: along.toFixed(1),
-      r: 3.5,
+      r: mark.size ?? 3.5,
       fill: "none",
       stroke: colour,
       "stroke-width": width,

@@ -1,9 +1,9 @@
 // The panels of the figures: which curves of the state are drawn, and as what.
 
-import { current, isCurrent, nameOfRun, differences } from "./answer.js";
+import { current, differences, isCurrent, isDescribed, nameOf, nameOfRun } from "./answer.js";
 import { axisOf } from "./figure.js";
 import { greek, lettered, scaled } from "./notation.js";
-import { same } from "./state.js";
+import { isFitted, same } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./figure.js").Panel} Panel */
@@ -39,7 +39,33 @@ const plus = (one, other) =>
  * @param {boolean} narrow
  * @returns {Panel[]} */
 export function panels(state, theme, narrow) {
+  if (isDescribed(state)) return ofServer(state, theme);
   return state.view.figure === "motion" ? ofMotion(state, theme, narrow) : ofCurves(state, theme, narrow);
+}
+
+/** Return the answer to which the figure that the server describes belongs: the last one of this figure.
+ * @param {State} state */
+export function describedOf(state) {
+  const found = state.answers.shown;
+  return found?.of.figure === state.view.figure && !found.answer.faults ? found : null;
+}
+
+/** @param {State} state
+ * @param {Theme} theme
+ * @returns {Panel[]} */
+function ofServer(state, theme) {
+  const found = describedOf(state)?.answer.panels ?? [];
+  const more = isFitted(state) ? (state.fit?.answer.marks ?? []) : [];
+  return found.map((/** @type {any} */ { of, x, y, height, marks }) => {
+    const own = more.filter((/** @type {any} */ mark) => of && mark.of === of);
+    const drawn = [...own, ...marks].map((/** @type {any} */ mark) => ({
+      ...mark,
+      label: greek(mark.label ?? ""),
+      colour: /** @type {any} */ (COLOURS)[mark.colour] ?? theme.ink,
+    }));
+    const across = drawn.map((/** @type {Mark} */ mark) => mark.x);
+    return { x: axisOf(greek(x.label), across, x), y: axisOf(y.label, drawn.flatMap(extent), y), height, marks: drawn };
+  });
 }
 
 /** Return the curves that are drawn: the last ones of the figure. They are those of the present numbers but for the
@@ -116,11 +142,10 @@ function ofCurves(state, theme, narrow) {
   const size = state.view.absolute ? `area A (${unit})` : "area (% of JKR's)";
   const first = panel(size, marks.area, narrow ? 230 : 300);
   if (narrow) return [first];
-  return [
-    first,
-    panel(`energy (${unitOf("work_of_adhesion")[1]})`, marks.energy, 110),
-    panel(`friction (${unitOf("friction_force")[1]})`, marks.friction, 130),
-  ];
+  const energy = panel(`energy (${unitOf("work_of_adhesion")[1]})`, marks.energy, 110);
+  const friction = panel(`friction (${unitOf("friction_force")[1]})`, marks.friction, 130);
+  // a scene without any friction has no panel of it
+  return largest(curves.friction_force) ? [first, energy, friction] : [first, energy];
 }
 
 /** Return the numbers that an axis has to hold.
@@ -204,7 +229,7 @@ function ofRun(state, name, factor, axis) {
   const isStale = state.run && differences(state, state.run.of.values) !== "";
   const band = current(state, "band");
   const runs = [
-    ...(state.run && !isStale ? [] : band ? [[band, `mean of ${band.members}`]] : []),
+    ...(state.run && !isStale ? [] : band ? [[band, nameOf(band.members)]] : []),
     ...(state.run ? [[state.run.answer, nameOfRun(state)]] : []),
   ];
   return runs
@@ -293,12 +318,14 @@ function ofMotion(state, theme, narrow) {
     width: 1,
     name: "changed",
   });
-  /** @type {(name: string, words: string, unit: string, zero: boolean, colour?: string, more?: Mark[]) => Panel} */
-  const over = (name, words, unit, zero, colour = theme.ink, more = []) => {
+  /** @type {(name: string, words: string, unit: string, zero: boolean, colour?: string) => Panel} */
+  const over = (name, words, unit, zero, colour = theme.ink) => {
     const [factor, shown] = scaled(largest(columns[name]), unit);
     const y = times(columns[name], factor);
     const line = /** @type {Mark} */ ({ kind: "line", x: t, y, colour, width: 1.4, name });
-    return { x: time, y: axisOf(`${words} (${shown})`, [y], { zero }), height, marks: [line, ...more, changes] };
+    const others = besides(state, ["t", perTime], [name, factor]);
+    const ends = [y, ...others.map((mark) => mark.y)];
+    return { x: time, y: axisOf(`${words} (${shown})`, ends, { zero }), height, marks: [...others, line, changes] };
   };
   if (columns.normal_load) return ofMount(state, theme, over);
   const area = over("contact_area", "area A", "m^2", false, COLOURS.bonds);
@@ -306,6 +333,25 @@ function ofMotion(state, theme, narrow) {
   const friction = over("friction_force", "friction F", "N", true);
   if (columns.slider_position) return [over("slider_position", "displacement", "m", true), friction, area];
   return [friction, area];
+}
+
+/** Return the motions at other points of the sweep as thin lines.
+ * @param {State} state
+ * @param {[string, number]} across name and factor of a column
+ * @param {[string, number]} along
+ * @returns {Mark[]} */
+function besides(state, [x, perX], [y, perY]) {
+  return (current(state, "others")?.others ?? [])
+    .filter((/** @type {any} */ { columns }) => columns?.[x] && columns[y])
+    .map((/** @type {any} */ { label, columns }) => ({
+      kind: "line",
+      x: times(columns[x], perX),
+      y: times(columns[y], perY),
+      colour: COLOURS.rest,
+      width: 1,
+      label: greek(label),
+      name: "other",
+    }));
 }
 
 /** @param {Numbers} values */
@@ -323,14 +369,30 @@ function ofMount(state, theme, over) {
   const known = columns[across] ? across : "displacement";
   const [perX, unitX] = scaled(largest(columns[known]), known === "normal_load" ? "N" : "m");
   const [perY, unitY] = scaled(largest(columns[along]), along === "normal_load" ? "N" : "m");
-  const [x, y] = [times(columns[known], perX), times(columns[along], perY)];
+  const x = times(columns[known], perX);
+  const y = broken(times(columns[along], perY), isLoad);
   const words = (/** @type {string} */ name, /** @type {string} */ unit) => `${name.replaceAll("_", " ")} (${unit})`;
   const loop = /** @type {Mark} */ ({ kind: "line", x, y, colour: theme.ink, width: 1.6, name: "loop" });
+  const others = besides(state, [known, perX], [along, perY]).map((mark) => ({ ...mark, y: broken(mark.y, isLoad) }));
+  const [wide, high] = [
+    [x, ...others.map((mark) => mark.x)],
+    [y, ...others.map((mark) => mark.y)],
+  ];
   return [
-    { x: axisOf(words(known, unitX), [x]), y: axisOf(words(along, unitY), [y]), height: 260, marks: [loop] },
+    {
+      x: axisOf(words(known, unitX), wide),
+      y: axisOf(words(along, unitY), high),
+      height: 260,
+      marks: [...others, loop],
+    },
     over("contact_area", "area A", "m^2", true),
   ];
 }
+
+/** Return radii without those at which a contact under a load has jumped open or closed, so that no line joins them.
+ * @param {Numbers} radii
+ * @param {boolean} isLoad */
+const broken = (radii, isLoad) => radii.map((radius, k) => (isLoad && k && !radius !== !radii[k - 1] ? null : radius));
 
 /** Return the panels as a table: its headings, and a row for each place of the first axis.
  * @param {Panel[]} shown
@@ -339,7 +401,7 @@ export function tableOf(shown) {
   const lines = shown.flatMap(({ marks, y }) =>
     marks.filter(({ kind }) => kind === "line" || kind === "band").map((mark) => ({ mark, y })),
   );
-  const { x } = shown[0].marks.find(({ kind }) => kind === "line") ?? { x: [] };
+  const { x } = shown[0].marks.find(({ kind, name }) => kind === "line" && name !== "other") ?? { x: [] };
   const same = lines.filter(({ mark }) => mark.x.length === x.length);
   const every = Math.ceil(x.length / 200);
   const rows = x.map((at, k) => [

@@ -1,11 +1,11 @@
 // The page that belongs to a state. Controls are made once and then follow the state; figures are drawn anew.
 
-import { current, differences, isCurrent, nameOfRun } from "./answer.js";
+import { current, differences, isCurrent, isDescribed, nameOfRun } from "./answer.js";
 import { built, diverging, figure, frames, h, axisOf, placed, ticked } from "./figure.js";
 import { picture, ratio, reading } from "./live.js";
-import { digits, engineering, lettered, scaled } from "./notation.js";
-import { COLOURS, curvesOf, panels, tableOf } from "./panels.js";
-import { hasEnded, isOriginal, placeOf, same, textOf } from "./state.js";
+import { digits, engineering, greek, lettered, scaled } from "./notation.js";
+import { COLOURS, curvesOf, describedOf, panels, tableOf } from "./panels.js";
+import { hasEnded, isFitted, isOriginal, placeOf, same, textOf } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./state.js").Slider} Slider */
@@ -14,7 +14,14 @@ import { hasEnded, isOriginal, placeOf, same, textOf } from "./state.js";
 
 /** Steps of a slider. */
 export const STEPS = 300;
-const NAMES = { motion: "the motion", sweep: "over the sweep", speed: "over the sliding speed" };
+const NAMES = {
+  motion: "the motion",
+  sweep: "over the sweep",
+  speed: "over the sliding speed",
+  data: "measured curves",
+  spread: "spread of the members",
+  map: "map of stability",
+};
 const GROUPS = [
   ["Load and mount", ["contact"]],
   ["Drive", ["drive"]],
@@ -49,7 +56,6 @@ export function build({ start }) {
     label.append(element("input", "", { type: "radio", name: "figure", value: name }), ` ${NAMES[name]}`);
     $("figures").append(label);
   }
-  $("figures").hidden = start.figures.length < 2;
   const groups = new Map(GROUPS.map(([title]) => [title, /** @type {Slider[]} */ ([])]));
   for (const slider of start.sliders) {
     const first = slider.key.split(".")[0];
@@ -139,14 +145,16 @@ export function render(state, screen) {
   for (const item of document.querySelectorAll("#figures input")) {
     const radio = /** @type {HTMLInputElement} */ (item);
     radio.checked = radio.value === view.figure;
+    /** @type {HTMLElement} */ (radio.parentElement).hidden = radio.value === "data" && !state.table;
   }
+  $("figures").hidden = document.querySelectorAll("#figures label:not([hidden])").length < 2;
   for (const name of /** @type {const} */ (["absolute", "first", "loads"])) $(name).checked = view[name];
   const level = Math.round(100 * view.share);
   if (document.activeElement !== $("level") || !state.dragging) $("level").value = level;
   $("level").setAttribute("aria-valuetext", `${level} %`);
   $("percent").textContent = `${level} %`;
-  $("view").hidden = view.figure === "motion";
-  $("preview").hidden = view.figure === "motion" || !state.start.preview.length;
+  $("view").hidden = view.figure === "motion" || isDescribed(state);
+  $("preview").hidden = $("view").hidden || !state.start.preview.length;
   for (const slider of state.start.sliders) follow(state, slider);
   for (const item of document.querySelectorAll("#mechanisms input")) {
     const box = /** @type {HTMLInputElement} */ (item);
@@ -214,23 +222,23 @@ function interval(state, slider, track) {
   else track.append(drawn);
 }
 
-/** Return true if the state has the numbers of the last fit, and those that the fit started from otherwise.
+/** Return the numbers to which the figure that is drawn belongs.
  * @param {State} state */
-function isFitted({ fit, values, table }) {
-  return (
-    fit !== null && fit.of.data === table && same({ ...fit.of.values, ...fit.values }, { ...fit.of.values, ...values })
-  );
+function valuesOf(state) {
+  if (state.view.figure === "motion") return state.motion.pieces.at(-1)?.of;
+  return (isDescribed(state) ? describedOf(state) : state.answers.curves)?.of.values;
 }
+
+/** Return the sentence of curves.
+ * @param {State} state */
+const wordsOf = (state) => (isDescribed(state) ? describedOf(state)?.answer.words : curvesOf(state)?.level.words) ?? "";
 
 /** Show the sentences. Those on earlier numbers are grey until new ones arrive.
  * @param {State} state */
 function words(state) {
-  const { view, motion } = state;
-  const curves = curvesOf(state);
-  $("lost").textContent = view.figure === "motion" ? course(state) : (curves?.level.words ?? "");
-  $("lost").dataset.of = JSON.stringify(
-    view.figure === "motion" ? motion.pieces.at(-1)?.of : state.answers.curves?.of.values,
-  );
+  const { view } = state;
+  $("lost").textContent = view.figure === "motion" ? course(state) : wordsOf(state);
+  $("lost").dataset.of = JSON.stringify(valuesOf(state));
   const found = state.answers.words;
   const { pin } = state;
   const at = pin ? differences(state, pin.of.values) : "";
@@ -299,7 +307,7 @@ function data(state) {
   const { fit, table } = state;
   const found = curvesOf(state)?.data;
   $("free").hidden = !table;
-  $("fit").disabled = !table || Boolean(state.job);
+  $("fit").disabled = $("plan").disabled = !table || Boolean(state.job);
   if (found) {
     const residuals = Object.values(/** @type {Record<string, any>} */ (found.points)).flatMap(
       (points) => points.residuals,
@@ -344,34 +352,45 @@ function plot(state, { isDark, isNarrow }) {
   const isMotion = state.view.figure === "motion";
   $("live").hidden = !isMotion;
   const { answers, motion, view, run, pin, reading: place } = state;
-  const { curves, before, others, band } = answers;
+  const { curves, before, others, band, shown: described } = answers;
   const looks = [isDark, isNarrow, $("plot").clientWidth, $("numbers").open];
-  const parts = [curves, before, others, band, motion.columns, motion.pieces, view, run, pin, place, ...looks];
+  const parts = [
+    curves,
+    before,
+    others,
+    band,
+    described,
+    motion.columns,
+    motion.pieces,
+    view,
+    run,
+    pin,
+    place,
+    ...looks,
+  ];
   if (!isNew("plot", parts)) {
     if (isMotion && drawn.node) now(state, { isDark });
     return;
   }
   const shown = panels(state, look, isNarrow);
   drawn.shown = shown;
-  $("reader").hidden = !shown.length;
   if (!shown.length) {
     drawn.node = null;
+    $("reader").hidden = true;
     $("plot").replaceChildren();
     return;
   }
   const table = tableOf(shown);
+  $("reader").hidden = !table.rows.length;
   const mark = readAt(state, shown, table);
   drawn.width = Math.max(300, $("plot").clientWidth);
-  drawn.shared = !state.motion.columns.normal_load || !isMotion;
-  const name = isMotion
-    ? "The motion of the first member"
-    : `Contact area, energies and friction ${NAMES[state.view.figure]}`;
+  drawn.shared = isMotion ? !motion.columns.normal_load : view.figure !== "data";
+  const name = `${state.start.title}: ${NAMES[view.figure]}`;
   const description = $("lost").textContent;
   const about = { width: drawn.width, theme: look, title: name, description, shared: drawn.shared };
   drawn.node = figure(mark ? shown.map((panel) => ({ ...panel, marks: [...panel.marks, mark] })) : shown, about);
   $("plot").replaceChildren(built(drawn.node));
-  const of = isMotion ? state.motion.pieces.at(-1)?.of : state.answers.curves.of.values;
-  $("plot").dataset.of = JSON.stringify(of);
+  $("plot").dataset.of = JSON.stringify(valuesOf(state));
   $("plot").dataset.share = state.answers.curves?.of.share;
   if ($("numbers").open) {
     const head = element("tr");
@@ -463,8 +482,9 @@ export function now(state, { isDark }) {
   const { left, right, rows } = frames(drawn.shown, drawn.width, drawn.shared);
   const marks = drawn.shown.flatMap((panel, k) => {
     const [top, bottom] = rows[k];
-    if (panel.marks[0].name === "loop") {
-      const { x, y } = panel.marks[0];
+    const loop = panel.marks.find(({ name }) => name === "loop");
+    if (loop) {
+      const { x, y } = loop;
       const place = Math.min(
         x.length - 1,
         motion.columns.t.findLastIndex((t) => Number(t) <= motion.time),

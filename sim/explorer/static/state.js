@@ -7,9 +7,9 @@ import { engineering } from "./notation.js";
  * @typedef {Record<string, number>} Values */
 /** @typedef {{ key: string, meaning: string, symbol: string, unit: string, value: number, low: number, high: number,
  *   logarithmic: boolean, marked: boolean, over_wavelength: number | null }} Slider */
-/** @typedef {"motion" | "sweep" | "speed"} Figure */
+/** @typedef {"motion" | "sweep" | "speed" | "data" | "spread" | "map"} Figure */
 /** What the server tells once.
- * @typedef {{ title: string, question: string, path: string, sliders: Slider[], points: Values[],
+ * @typedef {{ title: string, question: string, path: string, stamp: string, sliders: Slider[], points: Values[],
  *   mechanisms: { key: string, name: string, on: number }[], figures: Figure[], preview: string[], members: number,
  *   duration: number, speed: number, mount: string, data: string | null }} Start */
 /** @typedef {{ share: number, absolute: boolean, first: boolean, loads: boolean, figure: Figure }} View */
@@ -246,6 +246,14 @@ export function withFit(state) {
   return state.fit ? moved(state, state.fit.values) : state;
 }
 
+/** Return true if the state has the numbers of the last fit, and those that the fit started from otherwise.
+ * @param {State} state */
+export function isFitted({ fit, values, table }) {
+  return (
+    fit !== null && fit.of.data === table && same({ ...fit.of.values, ...fit.values }, { ...fit.of.values, ...values })
+  );
+}
+
 /** Return the state after the result of a job.
  * @param {State} state
  * @param {any} of
@@ -258,7 +266,7 @@ export function finished(state, of, result) {
   const values = Object.fromEntries(numbers.map(([key, { value }]) => [key, value]));
   const withResult = { ...next, fit: { of, answer: result, values } };
   const isAsked = same(of.values, state.values) && of.data === state.table;
-  return isAsked ? withFit(withResult) : withResult;
+  return isAsked && numbers.length ? withFit(withResult) : withResult;
 }
 
 /** Return the state in which its present curves are pinned for comparison, or none if they were.
@@ -277,14 +285,15 @@ export const tabled = (state, table) => ({ ...state, table, fit: null });
 
 /** Return the state with a part of a motion.
  * @param {State} state
- * @param {{ values: Values, step: number }} of
+ * @param {{ values: Values, run: string, step: number }} of
  * @param {any} answer
  * @returns {State} */
 export function continued(state, of, answer) {
   const { motion, start } = state;
   const { run, first, last, steps, is_new: isNew, duration, columns } = answer;
   const from = (duration * first) / steps;
-  const old = isNew ? { ...still(start), paused: motion.paused, rate: motion.rate } : motion;
+  const time = of.run || hasEnded(motion, start) ? 0 : motion.time;
+  const old = isNew ? { ...still(start), paused: motion.paused, rate: motion.rate, time } : motion;
   const size = isNew ? 0 : count(old.columns.t, from, duration / steps);
   const joined = Object.fromEntries(
     Object.entries(/** @type {Record<string, (number | null)[]>} */ (columns)).map(([name, values]) => [
@@ -335,8 +344,17 @@ export const hasEnded = (motion, start) => motion.time >= start.duration * (1 - 
 export function played(state, seconds) {
   const { motion, start } = state;
   const known = /** @type {number} */ (motion.columns.t.at(-1) ?? 0);
-  const time = Math.min(known, motion.time + seconds * motion.rate, start.duration);
+  const time = Math.max(motion.time, Math.min(known, motion.time + seconds * motion.rate, start.duration));
   return { ...state, motion: { ...motion, time } };
+}
+
+/** Return the state in which the motion of other numbers begins at a time.
+ * @param {State} state
+ * @param {{ values: Values, time: number }} point */
+export function begun(state, { values, time }) {
+  const next = viewed(moved(state, values), { figure: "motion" });
+  const { rate } = state.motion;
+  return { ...next, past: next.past.slice(0, -1), motion: { ...still(state.start), rate, time } };
 }
 
 /** Return the state with a change of the motion, such as a pause.

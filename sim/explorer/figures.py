@@ -1,0 +1,282 @@
+"""Figures that the page draws as they are described here: measured curves, spread of members, map of stability."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from sim.explorer.drawing import listed
+from sim.parts.exchange import Array
+from sim.quantities import QUANTITIES
+from sim.scenario.scenario import Scenario
+from sim.units.notation import engineering, scaled
+
+if TYPE_CHECKING:
+    from sim.study.likelihood import Measured, Problem
+
+#: Colours of curves that differ in their conditions, by the names that the page has for them.
+_COLOURS = ("bonds", "fluctuations", "own", "stress", "rest")
+#: Most members of a figure; bins of a distribution; cells of a row of the map.
+_MEMBERS, _BINS, _CELLS = 2000, 40, 24
+#: Share of chi^2 in the count of numbers above which a fit is proposed.
+_POOR = 3.0
+#: Fits that are drawn of the distribution of a fit.
+_DRAWS = 30
+
+
+def axis(label: str, unit: str, log: bool = False, **choices: Any) -> dict[str, Any]:
+    """Return the description of an axis: its label with the unit, and how it is chosen."""
+    return {"label": f"{label} ({unit})" if unit else label, "log": log, **choices}
+
+
+def _mark(kind: str, x: Array, y: Array, colour: str, **more: Any) -> dict[str, Any]:
+    return {"kind": kind, "x": listed(x), "y": listed(y), "colour": colour} | more
+
+
+def _plain(words: str) -> str:
+    return words.replace("$", "").replace("\\", "")
+
+
+def measured(scenario: Scenario, table: "Measured") -> dict[str, Any]:
+    """Return each measured curve over the condition that varies most, with its prediction and its residuals.
+
+    Residuals are in standard errors. They are left out for a curve without errors.
+    """
+    from sim.study.likelihood import problem_of
+
+    problem = problem_of(scenario, [table], [], {})
+    return {"panels": _panels(problem, problem.start), "words": _fitness(problem)}
+
+
+def _fitness(problem: "Problem") -> str:
+    off = problem.residuals(problem.start)[: len(problem.values)]
+    residuals = np.where(problem.estimated, np.nan, off)
+    count = int(np.isfinite(residuals).sum())
+    if not count:
+        return "The measured curves have no errors, so there is no χ²"
+    far = float(np.nanmax(np.abs(residuals)))
+    total = float(np.nansum(residuals**2))
+    square = f"χ² = {total:.4g} for {count} measured numbers"
+    cure = "; tick the numbers to fit below" * (total > _POOR * count)
+    return f"{square}, the largest residual is {far:.2g} standard errors{cure}"
+
+
+def _panels(problem: "Problem", x: Array) -> list[dict[str, Any]]:
+    """Return two panels for each measured variable: its curves, and below them their residuals."""
+    from sim.plots.style import axis_scale
+    from sim.study.fit import courses
+
+    every, labels = courses(problem, x)
+    result = []
+    for name in dict.fromkeys(course.name for course in every):
+        drawn = [course for course in every if course.name == name]
+        along = drawn[0].along
+        places = along.values
+        is_log = axis_scale(places) == "log"
+        has_errors = not problem.estimated[problem.of(name)].any()
+        (per_x, unit_x), (per_y, unit_y) = _scales(problem, name, places, along.unit)
+        curves, residuals = list[Any](), list[Any]()
+        for course in drawn:
+            colour = _COLOURS[course.label % len(_COLOURS)]
+            at, fine = per_x * course.x, per_x * course.fine
+            label = _plain(labels[course.label]) or "model"
+            curves.append(
+                _mark("line", fine, per_y * course.smooth, colour, label=label)
+            )
+            values = per_y * course.values
+            more: dict[str, Any] = {"name": "measured"}
+            if has_errors:
+                more |= {"high": listed(per_y * course.errors)}
+                off = course.residuals
+                residuals.append(_mark("points", at, off, colour, name="residual"))
+            curves.append(_mark("points", at, values, colour, **more))
+        across = axis(_plain(along.words), unit_x, is_log)
+        quantity = QUANTITIES[name].meaning.partition(",")[0]
+        upper = axis(quantity, unit_y, zero=True)
+        panel = {"of": name, "x": across, "y": upper, "height": 260, "marks": curves}
+        result.append(panel)
+        if has_errors:
+            zero = per_x * np.array([places.min(), places.max()])
+            residuals.append(_mark("line", zero, 0.0 * zero, "rest", width=1))
+            lower = axis("residual / σ", "")
+            result.append({"x": across, "y": lower, "height": 90, "marks": residuals})
+    return result
+
+
+def _scales(
+    problem: "Problem", name: str, places: Array, unit: str
+) -> tuple[tuple[float, str], tuple[float, str]]:
+    """Return factors from SI and units of both axes of a measured curve, which depend on the table alone."""
+    largest = float(np.max(np.abs(problem.values[problem.of(name)])))
+    across = scaled(float(np.max(np.abs(places))), unit)
+    return across, scaled(largest, QUANTITIES[name].unit)
+
+
+def band(
+    problem: "Problem", x: Array, covariance: Array, seed: int
+) -> list[dict[str, Any]]:
+    """Return the bands between the lowest and the highest of 30 fits that are drawn from the covariance of a fit.
+
+    A mark has the variable ``of`` its panel in the figure of the measured curves.
+    """
+    from sim.study.fit import courses
+
+    ends = np.array(problem.bounds).T
+    drawn = np.random.default_rng(seed).multivariate_normal(x, covariance, _DRAWS)
+    every = [courses(problem, np.clip(place, *ends))[0] for place in drawn]
+    result = []
+    for fits in zip(*every, strict=True):
+        course, curves = fits[0], np.array([one.smooth for one in fits])
+        along = course.along
+        across, upper = _scales(problem, course.name, along.values, along.unit)
+        low, high = upper[0] * curves.min(0), upper[0] * curves.max(0)
+        colour = _COLOURS[course.label % len(_COLOURS)]
+        more = {"high": listed(high), "name": "draws", "opacity": 0.3}
+        more |= {"of": course.name}
+        result.append(_mark("band", across[0] * course.fine, low, colour, **more))
+    return result
+
+
+def rings(problem: "Problem", points: Sequence[dict[str, float]]) -> list[Any]:
+    """Return further points of a plan, by their conditions [SI], as rings on the curve ``of`` each variable."""
+    from sim.study.fit import courses
+    from sim.study.likelihood import Curve, problem_of
+
+    (table,) = problem.tables
+    curves = [Curve(name, np.zeros(1), np.ones(1)) for name in table.names]
+    every = {course.name: course for course in courses(problem, problem.start)[0]}
+    result = []
+    for point in points:
+        conditions = {key: np.array([value]) for key, value in point.items()}
+        row = table._replace(conditions=conditions, curves=tuple(curves), baseline=0)
+        further = problem_of(problem.groups[0][0].scenario, [row], [], {})
+        for name, value in zip(table.names, further.steady(further.start), strict=True):
+            along = every[name].along
+            across, upper = _scales(problem, name, along.values, along.unit)
+            x, y = across[0] * conditions[along.key], upper[0] * np.array([value])
+            more = {"of": name, "name": "plan", "size": 8, "label": "measure next"}
+            result.append(_mark("points", x, y, "own", **more))
+    return result
+
+
+def spread(scenes: Sequence[Scenario], labels: Sequence[str]) -> dict[str, Any]:
+    """Return the distribution of the contact area over members at the end of the runs of some scenes."""
+    from sim.ensemble.simulate import run
+
+    marks, words = [], []
+    for place, (scene, label) in enumerate(zip(scenes, labels, strict=True)):
+        members = min(_MEMBERS, scene.ensemble.members)
+        dataset = run(scene.with_values({"ensemble.members": members}))
+        full = np.pi * dataset["jkr_radius"] ** 2
+        share = 100.0 * (dataset["contact_area"] / full).isel(t=-1).to_numpy().ravel()
+        share = share[np.isfinite(share)]
+        counts, edges = np.histogram(share, _BINS)
+        # percent of the members for each percent of the area
+        density = 100.0 * counts / len(share) / np.diff(edges)
+        x = np.repeat(edges, 2)
+        y = np.concatenate([[0.0], np.repeat(density, 2), [0.0]])
+        colour = _COLOURS[place % len(_COLOURS)]
+        marks.append(_mark("line", x, y, colour, label=label, name="spread"))
+        middle, width = np.mean(share), np.std(share, ddof=1)
+        at = f"{label}: " if len(labels) > 1 else ""
+        words.append(f"{at}{middle:.3g} ± {width:.2g} %")
+    panel = {
+        "x": axis("area", "% of JKR's", tight=True),
+        "y": axis("members", "% per % of area", zero=True),
+        "height": 320,
+        "marks": marks,
+    }
+    text = "Area of the members, mean and standard deviation: " + "; ".join(words)
+    return {"panels": [panel], "words": text}
+
+
+class StabilityMap:
+    """Swing of the spring force over speed and stiffness, one row of the map after the other.
+
+    The scenario sweeps the stiffness of the spring alone, and its stage moves at changing speed. The swing is the range
+    of the force in a cell over its largest. It has a panel for increasing and one for decreasing speed.
+    """
+
+    def __init__(self, stiffness: Sequence[float]) -> None:
+        self.stiffness = sorted(stiffness)
+        self._rows: dict[float, list[_Leg]] = {}
+        self._of: dict[str, float] = {}
+
+    def answer(self, scene: Scenario, values: dict[str, float]) -> dict[str, Any]:
+        """Return the map with one further row for the numbers of a scene; ``more`` is True until it has all rows."""
+        others = {key: x for key, x in values.items() if key != _STIFFNESS}
+        if others != self._of:
+            self._of, self._rows = others, {}
+        missing = [one for one in self.stiffness if one not in self._rows]
+        if missing:
+            self._rows[missing[0]] = _legs(scene.with_values({_STIFFNESS: missing[0]}))
+        return self._drawn(len(missing) > 1)
+
+    def _drawn(self, more: bool) -> dict[str, Any]:
+        hard = np.array(self.stiffness)
+        per_y, unit_y = scaled(float(np.sqrt(hard[0] * hard[-1])), "N/m")
+        middle = np.sqrt(hard[1:] * hard[:-1])
+        sides = [hard[0] ** 2 / middle[0], *middle, hard[-1] ** 2 / middle[-1]]
+        panels, plays, slipping = dict[str, Any](), dict[str, Any](), set[float]()
+        for place, stiffness in enumerate(self.stiffness):
+            for leg in self._rows.get(stiffness, []):
+                per_x, unit_x = scaled(leg.edges[-1], "m/s")
+                tight = {"log": True, "tight": True}
+                across = axis("speed of the stage", unit_x, **tight)
+                upper = axis(f"K, {leg.words}", unit_y, **tight)
+                panel = {"x": across, "y": upper, "height": 230, "marks": []}
+                panel = panels.setdefault(leg.words, panel)
+                low, high = per_y * sides[place], per_y * sides[place + 1]
+                for cell in np.flatnonzero(np.isfinite(leg.swings)).tolist():
+                    swing, name = float(leg.swings[cell]), f"{leg.words} {place} {cell}"
+                    opacity = max(0.02, 0.9 * swing)
+                    look = {"name": name, "high": [high, high], "opacity": opacity}
+                    x, y = per_x * leg.edges[[cell, cell + 1]], np.array([low, low])
+                    panel["marks"].append(_mark("band", x, y, "fluctuations", **look))
+                    time = float(leg.times[cell])
+                    plays[name] = {"values": {_STIFFNESS: stiffness}, "time": time}
+                    if swing > _SLIPS:
+                        slipping.add(stiffness)
+        words = "No spring shown sticks and slips"
+        if slipping:
+            hardest = engineering(max(slipping), "N/m")
+            words = f"Sticks and slips with springs up to {hardest}; the swing of the force is the larger the darker"
+        words += "; more rows follow" if more else ". Click a cell to play it"
+        shown = [*panels.values()]
+        return {"panels": shown, "words": words, "more": more, "plays": plays}
+
+
+#: Key of the map, and swing of the force from which a cell sticks and slips.
+_STIFFNESS, _SLIPS = "drive.stiffness", 0.5
+
+
+class _Leg(NamedTuple):
+    """Swings of the force in cells of the speed between ``edges``, while the speed grows or falls, and their times."""
+
+    words: str
+    edges: Array
+    swings: Array
+    times: Array
+
+
+def _legs(scene: Scenario) -> list[_Leg]:
+    """Return the legs of a run at growing and at falling speed of the stage."""
+    from sim.ensemble.simulate import run
+
+    dataset = run(scene.with_values({"ensemble.members": 1}))
+    force = np.abs(dataset["spring_force"].to_numpy().ravel())
+    speed = np.abs(dataset["stage_speed"].to_numpy().ravel())
+    time, turn = dataset["t"].to_numpy(), int(np.argmax(speed)) + 1
+    edges = np.geomspace(speed[speed > 0.0].min(), speed.max(), _CELLS + 1)
+    place = np.clip(np.searchsorted(edges, speed, "right") - 1, 0, _CELLS - 1)
+    result = []
+    for words, leg in (("V grows", slice(0, turn)), ("V falls", slice(turn, None))):
+        swings, times = np.full(_CELLS, np.nan), np.full(_CELLS, np.nan)
+        for cell in np.unique(place[leg]):
+            here = np.flatnonzero(place[leg] == cell)
+            forces = force[leg][here]
+            swings[cell] = 1.0 - forces.min() / forces.max()
+            times[cell] = time[leg][here[0]]
+        if len(force[leg]) > _CELLS:
+            result.append(_Leg(words, edges, swings, times))
+    return result
