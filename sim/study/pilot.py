@@ -160,10 +160,11 @@ class Pilots:
             if self.spent + self.needed(scenario) > self.budget:
                 return None
             datasets: Iterable[xr.Dataset] = (plain(run(point)) for point in points)
-            if not self.names:
+            if not self._samples:
                 datasets = [*datasets]
                 names = [name for each in datasets for name in self.default(each)]
-                self.names = [*dict.fromkeys(names)]
+                self.names = self.names or [*dict.fromkeys(names)]
+                _check(self.names, datasets)
             samples, substeps, is_resolved = list[Sample](), list[float](), True
             for point, dataset in zip(points, datasets, strict=True):
                 samples.append(self._sample_at(point, dataset))
@@ -218,21 +219,16 @@ class Pilots:
         driven = pilot.drive.solves_motion
         late = slice(dataset.sizes["t"] // 2 * driven, None)
         numbers = 1 if driven else dataset.sizes["t"]
-        possible = {str(name) for name in known if has_mean(str(name))}
-        possible |= {n for n, one in happened.items() if {*one.value.dims} <= {MEMBERS}}
         means = [name for name in self.names if name in known and not driven]
         estimates = over_members(dataset, means, quantiles=False) if means else {}
         rows = list[tuple[Array, Array, Array, Array]]()
         for name in self.names:
             quantity, _, statistic = name.partition(":")
-            if quantity not in possible or statistic not in STATISTICS:
-                raise BadInput(
-                    [
-                        f"accuracy.of: {name} is not compared; known: "
-                        f"{', '.join(sorted(possible))}, alone or with :spread, :skewness"
-                    ]
-                )
-            values = known[quantity] if quantity in known else happened[quantity].value
+            values = xr.DataArray(math.nan)  # an event that other points have
+            if quantity in known:
+                values = known[quantity]
+            elif quantity in happened:
+                values = happened[quantity].value
             if quantity in TIMES:
                 values = dataset.get(quantity, values).fillna(pilot.clock.duration)
             values = values.astype(float)
@@ -264,6 +260,26 @@ class Pilots:
             energy = control.deviation.transpose(MEMBERS, "t").to_numpy()
         mean, sem, each, unit = map(np.array, zip(*rows, strict=True))
         return Sample(mean, sem, each, unit, np.nan_to_num(energy))
+
+
+def _check(names: Iterable[str], datasets: Iterable[xr.Dataset]) -> None:
+    """Raise an error if a name is compared at no point of a sweep, of which these are the datasets."""
+    possible = set[str]()
+    for dataset in datasets:
+        possible |= {
+            n for n in map(str, closed_observables(dataset, None)) if has_mean(n)
+        }
+        once = events(dataset)
+        possible |= {n for n, one in once.items() if {*one.value.dims} <= {MEMBERS}}
+    for name in names:
+        quantity, _, statistic = name.partition(":")
+        if quantity not in possible or statistic not in STATISTICS:
+            raise BadInput(
+                [
+                    f"accuracy.of: {name} is not compared; known: "
+                    f"{', '.join(sorted(possible))}, alone or with :spread, :skewness"
+                ]
+            )
 
 
 def _is_share(quantity: str) -> bool:
