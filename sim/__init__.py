@@ -331,13 +331,20 @@ def methods(
 
 
 def converge(
-    scenario: "Scenario | Path | dict[str, Any]", budget: float | str = "60 s"
+    scenario: "Scenario | Path | dict[str, Any]",
+    budget: float | str = "60 s",
+    of: "Sequence[str]" = (),
 ) -> "xarray.Dataset":
-    """Compare speed and error of the models and settings of a scenario, in about ``budget`` [s] of computing time."""
+    """Compare speed and error of the models and settings of a scenario, with a ``budget`` of counted work [s].
+
+    Compared are the names ``of``, such as ``"contact_area"`` or ``"fluctuation_energy:skewness"``; by default all that
+    the scene's table shows, with their spreads. The attribute ``recommendation`` is the best combination.
+    """
     from sim.study.converge import converge as study
     from sim.units.quantity import read_option
 
-    return study(_scene(scenario), read_option(budget, "budget", "s", above=0))
+    seconds = read_option(budget, "budget", "s", above=0)
+    return study(_scene(scenario), seconds, of=tuple(of))
 
 
 def fit(

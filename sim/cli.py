@@ -706,10 +706,16 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     "--budget",
     default="60 s",
     show_default=True,
-    help="Computing time for all settings together.",
+    help="Counted work for all settings together.",
 )
 @click.option(
     "--tolerance", help="Accepted error, such as 1 %. Default: that of the scenario."
+)
+@click.option(
+    "--of",
+    "of",
+    metavar="NAMES",
+    help="Compared, such as contact_area,friction_force:spread. Default: all in the scenario's table.",
 )
 @_SET
 @_FORCE
@@ -718,16 +724,16 @@ def converge(
     output: Path | None,
     budget: str,
     tolerance: str | None,
+    of: str | None,
     changes: tuple[str, ...],
     force: bool,
 ) -> None:
-    """Compare speed and error of models, tolerances and clock steps, and recommend a setting.
+    """Compare speed and error of models, tolerances and clock steps, and recommend a combination.
 
-    Means and standard deviations are compared at all recorded times. With a spring or a prescribed force, averages over
-    the second half of the run are compared. Peaks and slip events are not. Nothing is recommended if the results are
-    not shown to converge as the clock step decreases. If the budget is spent, the output names a larger one.
-
-    Only one core is used, because simultaneous runs would disturb the measured times.
+    Means and standard deviations of all quantities of the scenario's table are compared at all recorded times, and its
+    events. With a spring or a prescribed force, means over the second half of the run are compared. The recommended
+    combination is run against the finest one. Nothing is recommended if the results are not shown to converge as the
+    clock step decreases.
     """
     from sim.units.quantity import read_option
 
@@ -741,7 +747,8 @@ def converge(
     from sim.study.converge import study
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
-    print_table(*study(scene, target, force, seconds, accepted), keys=1)
+    names = tuple(name.strip() for name in (of or "").split(",") if name.strip())
+    print_table(*study(scene, target, force, seconds, accepted, names), keys=1)
 
 
 @cli.command(

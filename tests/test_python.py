@@ -188,7 +188,7 @@ def test_a_report_is_a_page_that_is_saved_if_a_file_is_named(file, dataset, tmp_
 
 def test_converge_takes_a_budget_as_text(monkeypatch):
     monkeypatch.setattr(
-        "sim.study.converge.converge", lambda scene, seconds: (scene.name, seconds)
+        "sim.study.converge.converge", lambda scene, seconds, of: (scene.name, seconds)
     )
     assert sim.converge(SCENE, "2 min") == (SCENE["name"], 120.0)
     with pytest.raises(sim.BadInput, match=r"^budget 2 kg: .*not a unit of s"):

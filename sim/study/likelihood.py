@@ -24,6 +24,7 @@ from scipy import linalg, optimize, stats
 from scipy.stats import qmc
 
 from sim.ensemble.dataset import variable_name
+from sim.ensemble.plan import together
 from sim.ensemble.steady import (
     Values,
     history_at_rest,
@@ -34,11 +35,12 @@ from sim.ensemble.variables import READ, VARIABLES
 from sim.laws import theories
 from sim.laws.incipient import Incipient
 from sim.laws.theories import compare_at_indentation, compare_at_load
+from sim.parts.drive import Driven
 from sim.parts.exchange import Array
 from sim.quantities import QUANTITIES
 from sim.scenario.scenario import Clock, Scenario
 from sim.scenario.schema import changed, quantities
-from sim.step.state import Trajectory
+from sim.step.state import MemberNoise, Trajectory
 from sim.study.noise import FEWEST, Noise, noise_of
 from sim.units.errors import BadInput
 from sim.units.instrument import Instrument, Reading, Zero
@@ -631,13 +633,13 @@ def _records(point: Scenario, names: list[str]) -> tuple[Array, Array]:
     If the speed is prescribed, the variables are the differences from steady sliding. A run that adds nothing has no
     error between its records.
     """
-    from sim.study.converge import recorded  # which draws figures
-
     count = point.ensemble.members if point.is_random else 1
     steps = range(0, point.clock.steps + 1, point.clock.stride)
-    speeds, *values = recorded(
-        point, range(count), steps, [READ[name] for name in ("speed", *names)]
+    batches = np.array_split(
+        np.arange(count, dtype=np.int64), -(-count // together(point))
     )
+    runs = [_recorded(point, batch, steps, ["speed", *names]) for batch in batches]
+    speeds, *values = np.concatenate(runs, axis=1)
     times = point.times.at(np.array(steps))
     if not point.drive.solves_motion:
         alone = steady_course(point, times[:, np.newaxis], speeds[:1].T)
@@ -646,6 +648,31 @@ def _records(point: Scenario, names: list[str]) -> tuple[Array, Array]:
             for name, members in zip(names, values, strict=True)
         ]
     return times, np.array(values)
+
+
+class Unresolved(RuntimeError):
+    """A motion that is not resolved: its missing values are no numbers to compare."""
+
+    exit_code = 1
+
+
+def _recorded(
+    point: Scenario, members: NDArray[np.int64], steps: range, names: Sequence[str]
+) -> Array:
+    """Return variables of some members at some clock steps, shape (names, members, steps)."""
+    noise = MemberNoise.of(point.seed, members)
+    state, course = point.stepper.follow(noise, None, steps)
+    if point.drive.solves_motion:
+        unresolved = np.isfinite(cast(Driven, state.drive).unresolved_time)
+        if unresolved.any():
+            raise Unresolved(
+                f"with clock.step = {point.clock.step:.3g} s some members could not be resolved; "
+                "set drive.viscosity or a shorter clock.step"
+            )
+    shape = len(steps), len(members)
+    return np.array(
+        [np.broadcast_to(READ[name](point, course), shape).T for name in names]
+    )
 
 
 #: Probability of an interval.

@@ -17,22 +17,17 @@ import itertools
 import json
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple, cast
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import special
 
 from sim.ensemble.dataset import scenario_json
-from sim.ensemble.pace import counted
-from sim.ensemble.plan import Plan, seconds_a_step, together
-from sim.ensemble.simulate import run
+from sim.ensemble.plan import together
 from sim.ensemble.swept import spread
-from sim.quantities import QUANTITIES, Form, has_mean
-from sim.read.control_variate import control_variate
+from sim.quantities import has_mean
 from sim.read.correlation import Array
-from sim.read.dataset import MEMBERS, plain
-from sim.read.observables import closed_observables
-from sim.read.statistics import over_members
 from sim.scenario.files import written
 from sim.scenario.scenario import Scenario
 from sim.scenario.sweep import written as written_sweep
@@ -43,26 +38,33 @@ from sim.study.accuracy import (
     step_values,
     students,
 )
+from sim.study.pilot import (
+    POINTS,
+    Cost,
+    Names,
+    Pilots,
+    Sample,
+    difference,
+    in_units,
+    usual,
+)
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 
-#: Quantities that are compared if none are named, as far as they are recorded.
-USUAL = ("contact_area", "contact_radius", "friction_force", "bond_fraction")
 #: Members of the pilots, and fewest and most members of a run.
 _PILOTS, _FEWEST, _MOST = (32, 128, 512, 2048), 8, 10**6
 #: Clock steps over that of the scene, and the factor by which the change from one to the next falls at least: 4^p with
 #: the lowest order p = 1/2.
 _RATIOS, _FALL = tuple(4.0**power for power in range(2, -5, -1)), 2.0
-#: Change of the last clock step over the accepted error that is small enough, and points of a sweep that are tried.
-_SMALL, _POINTS = 0.1, 16
+_TOO_LONG, _UNRESOLVED = "does not fit into the budget", "motion not resolved"
+#: Change of the last clock step over the accepted error that is small enough.
+_SMALL = 0.1
 #: Models without noise, of which the last that a scene admits stands for a random one.
 _NOISELESS = ("mean", "rate", "cohort")
 #: Work of a run over that of its pilots beyond which larger pilots may find a cheaper run.
 _WORTH_MORE = 4.0
 #: Chance that the noise of a pilot is larger than estimated.
 _UNSURE = 0.2
-#: Errors below this are roundings.
-_ROUNDING = 1e-12
 
 
 class NotReached(RuntimeError):
@@ -75,31 +77,13 @@ class NotReached(RuntimeError):
 class Goal:
     """Accepted error of some quantities, and the counted work [s] that may be spent to reach it.
 
-    ``of`` without names stands for the ``USUAL`` ones that the scene records.
+    ``of`` without names stands for those that ``default`` returns of a pilot.
     """
 
     within: float
     of: tuple[str, ...] = ()
     budget: float = 60.0
-
-
-class Sample(NamedTuple):
-    """Means over the members of a pilot, at all points and times that are compared.
-
-    Attributes
-    ----------
-    mean, sem : array, shape (quantities, numbers)
-        Means and standard errors, at the known mean of ΔΓ where that is used; the errors are 0 without noise.
-    members : array, shape (quantities, members, numbers)
-        Values of each member.
-    energy : array, shape (members, numbers)
-        ΔΓ/⟨ΔΓ⟩ − 1 of each member, 0 where the mean of ΔΓ is not known.
-    """
-
-    mean: Array
-    sem: Array
-    members: Array
-    energy: Array
+    default: Names = usual
 
 
 class Setting(NamedTuple):
@@ -107,26 +91,32 @@ class Setting(NamedTuple):
 
     Attributes
     ----------
-    label : str
-        Name, "" for that of the scene.
+    part, label : str
+        Table of the scenario that it changes, and its name.
+    changes : dict
+        Keys of the table that choose it.
     values : dict
-        Keys of the scenario that choose it.
-    error : array, shape (quantities,)
-        Bound of its systematic error [1].
-    batch, each : float
-        Counted work of a step of a batch, and of each member in it [s].
+        Tables of the scenario with these changes.
+    error : array, shape (2, names)
+        Bound of its systematic error, and the noise of the pilots in it [1].
+    cost : Cost
+        Counted work.
+    is_own : bool
+        True for that of the scene.
     random : set of str
         Parts in which members differ, of shear and bonds.
     ratio : float
         Clock step over that of the scene.
     """
 
+    part: str
     label: str
+    changes: dict[str, Any]
     values: dict[str, Any]
     error: Array
-    batch: float
-    each: float
-    random: frozenset[str] = frozenset()
+    cost: Cost
+    is_own: bool
+    random: frozenset[str]
     ratio: float = 1.0
 
 
@@ -135,20 +125,17 @@ class Choice(NamedTuple):
 
     Attributes
     ----------
-    labels : tuple of str
-        Names of the settings that differ from the scene's.
-    values : dict
-        Keys of the scenario that choose them, and the members.
+    rows : tuple of Setting
+        The settings, that of the clock step last.
     members : int
         Members of the run.
     work : float
         Counted work of the run [s].
-    systematic, noise : array, shape (quantities,)
+    systematic, noise : array, shape (names,)
         Bounds of the systematic part and of the noise [1].
     """
 
-    labels: tuple[str, ...]
-    values: dict[str, Any]
+    rows: tuple[Setting, ...]
     members: int
     work: float
     systematic: Array
@@ -156,8 +143,19 @@ class Choice(NamedTuple):
 
     @property
     def total(self) -> float:
-        """The largest error of a quantity [1]."""
+        """The largest error of a name [1]."""
         return float(np.max(self.systematic + self.noise))
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the settings that differ from the scene's."""
+        return tuple(_named(row) for row in self.rows if not row.is_own)
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """Tables of the scenario that choose the settings that differ from the scene's."""
+        changed = [row.values for row in self.rows if not row.is_own]
+        return {part: table for values in changed for part, table in values.items()}
 
 
 class Search:
@@ -188,120 +186,41 @@ class Search:
         if scenario.fluctuations.measured:
             cure = "study fields of its spectrum, shear.spectrum"
             raise BadInput([f"shear.field: a map has no simpler model; {cure}"])
-        self.goal, self.spent, self.pilot = goal, spent, pilot
+        self.goal, self.pilot = goal, pilot
+        self.pilots = Pilots(pilot, goal.of, goal.default, goal.budget, spent)
+        #: Settings that do not fit into the budget or that the scene refuses, with the reason.
+        self.left_out = list[str]()
+        #: True if the finest model of a part does not fit into the budget.
+        self.lacks_finest = False
+        #: Quantity that does not converge as the clock step decreases, in words; else empty.
+        self.trend = ""
         self.sweep = {"sweep": written_sweep(scenario.sweep)} if scenario.sweep else {}
         self.scene = self._with(scenario, _without_auto(scenario) | {"accuracy": None})
-        self.names = [*goal.of]
-        self._samples = dict[str, Sample]()
-        sample = self._sample(self.scene)
+        sample = self.pilots[self.scene]
+        if self.pilots.is_unresolved(self.scene):
+            cure = "set drive.viscosity or a shorter clock.step"
+            raise NotReached(f"some motions could not be resolved; {cure}")
         if sample is None:
-            needed = engineering(10.0 * self._needed(self.scene), "s")
+            needed = engineering(10.0 * self.pilots.needed(self.scene), "s")
             raise NotReached(f'a pilot exceeds the budget; give --budget "{needed}"')
-        self.written = sample
-        by_point = np.abs(sample.mean).reshape(len(self.names), self.points, -1)
-        unit = np.broadcast_to(by_point.max(axis=2, keepdims=True), by_point.shape)
-        is_share = [QUANTITIES[name].form is Form.SHARE for name in self.names]
-        #: Largest mean at each point of the sweep, at all its numbers; 1 for shares.
-        self.unit = np.where(
-            np.array(is_share)[:, np.newaxis], 1.0, unit.reshape(sample.mean.shape)
-        )
+        self.written, self.names = sample, self.pilots.names
         free = self.pilot - 1.0
         unsure = math.sqrt(free / float(special.chdtri(free, 1.0 - _UNSURE)))
         #: Standard error of a single member, as large as the pilot allows [1].
         self.of_one = (
-            self._in_units(sample.sem).max(axis=1) * math.sqrt(self.pilot) * unsure
+            in_units(sample.sem, sample.unit).max(axis=1)
+            * math.sqrt(self.pilot)
+            * unsure
         )
+
+    @property
+    def spent(self) -> float:
+        """Return the counted work that is spent [s]."""
+        return self.pilots.spent
 
     def _with(self, scenario: Scenario, values: dict[str, Any]) -> Scenario:
         """Return a scenario with some keys changed, with its sweep."""
         return scenario.with_values(self.sweep | values, built=False)
-
-    def _pilots(self, scenario: Scenario) -> list[Scenario]:
-        """Return the pilots of a scene: some points of its sweep, with few members that are all recorded."""
-        changes = {
-            "ensemble.members": self.pilot,
-            "record.per_member": True,
-            "record.maps": (),
-            "record.quantities": None,
-        }
-        points = spread(scenario.points(), _POINTS)
-        return [point.with_values(changes, built=False) for point in points]
-
-    def _needed(self, scenario: Scenario) -> float:
-        """Return the counted work of the pilot of a scene [s]."""
-        return sum(counted(Plan.of(pilot)) for pilot in self._pilots(scenario))
-
-    def _sample(self, scenario: Scenario) -> Sample | None:
-        """Return the pilot of a scene, run once; None if its work does not fit into the budget."""
-        pilots = self._pilots(scenario)
-        key = "".join(map(scenario_json, pilots))
-        if key not in self._samples:
-            work = sum(counted(Plan.of(pilot)) for pilot in pilots)
-            if self.spent + work > self.goal.budget:
-                return None
-            self.spent += work
-            samples = map(self._sample_at, pilots)
-            self._samples[key] = Sample(
-                *(np.concatenate(arrays, -1) for arrays in zip(*samples, strict=True))
-            )
-        return self._samples[key]
-
-    def _sample_at(self, pilot: Scenario) -> Sample:
-        """Return the sample of a pilot without a sweep."""
-        dataset = plain(run(pilot))
-        pilot.release()
-        known = closed_observables(dataset, None)
-        possible = [str(name) for name in known if has_mean(str(name))]
-        self.names = self.names or [name for name in USUAL if name in possible]
-        if unknown := {*self.names} - {*possible}:
-            names = ", ".join(sorted(possible))
-            raise BadInput(
-                [f"accuracy.of: {min(unknown)} has no mean over time; known: {names}"]
-            )
-        estimates = over_members(dataset, self.names, quantiles=False)
-        late = slice(dataset.sizes["t"] // 2 * pilot.drive.solves_motion, None)
-        rows = list[tuple[Array, Array, Array]]()
-        for name in self.names:
-            one, values = estimates[name], known[name].astype(float)
-            if MEMBERS not in values.dims:
-                values = values.expand_dims({MEMBERS: self.pilot})
-            each = np.nan_to_num(values.transpose(MEMBERS, "t").to_numpy())
-            mean, sem = (
-                np.nan_to_num(np.zeros(each.shape[1]) if part is None else part)
-                for part in (one.value, one.sem)
-            )
-            if pilot.drive.solves_motion:
-                each = each[:, late].mean(axis=1, keepdims=True)
-                mean = each.mean(axis=0)
-                sem = each.std(axis=0, ddof=1) / math.sqrt(self.pilot)
-            rows.append((mean, sem, each))
-        control, energy = control_variate(dataset), np.zeros(rows[0][2].shape)
-        if control is not None and not pilot.drive.solves_motion:
-            energy = control.deviation.transpose(MEMBERS, "t").to_numpy()
-        mean, sem, each = map(np.array, zip(*rows, strict=True))
-        return Sample(mean, sem, each, np.nan_to_num(energy))
-
-    def difference(self, sample: Sample, reference: Sample) -> Array:
-        """Return bounds of the differences of two samples, shape (quantities,), in units of the largest mean.
-
-        Members have the same noise as far as the settings leave it, so that the differences of members may have the
-        smaller error; else it is that of the two means.
-        """
-        paired = sample.members - reference.members
-        of_pairs = paired.std(axis=1, ddof=1) / math.sqrt(self.pilot)
-        apart = np.hypot(sample.sem, reference.sem)
-        off = np.where(
-            of_pairs < apart, paired.mean(axis=1), sample.mean - reference.mean
-        )
-        bound = np.abs(off) + students(self.pilot) * np.minimum(of_pairs, apart)
-        return self._in_units(bound).max(axis=1)
-
-    def _in_units(self, values: Array) -> Array:
-        """Return values over the largest mean of the run at their point of the sweep; 0 for roundings."""
-        result = np.divide(
-            values, self.unit, out=np.zeros(values.shape), where=self.unit > 0.0
-        )
-        return np.where(result > _ROUNDING, result, 0.0)
 
     def noise(self, members: int) -> Array:
         """Return the simultaneous bound of the noise at all compared times, shape (quantities,)."""
@@ -322,15 +241,17 @@ class Search:
             )
         return high
 
-    def settings(self) -> list[list[Setting]]:
-        """Return the admissible settings of each part, with their systematic errors.
+    @cached_property
+    def groups(self) -> list[list[Setting]]:
+        """The admissible settings of each part, with their systematic errors; the clock steps are last.
 
         Settings whose pilot does not fit into the budget are left out.
 
         Raises
         ------
         NotReached
-            If the finest setting of a part, or a second clock step, does not fit into the budget.
+            If a setting of a part that is finer than that of the scene, or a second clock step, does not fit into the
+            budget.
         """
         rows = itertools.groupby(alternatives(self.scene), key=lambda row: row[0])
         groups = [
@@ -342,30 +263,68 @@ class Search:
     def _of_part(self, part: str, changes: list[dict[str, Any]]) -> list[Setting]:
         """Return the settings of one part, the simplest first."""
         own = part_table(getattr(self.scene, part))
-        admitted = list[tuple[str, dict[str, Any], Scenario]]()
+        admitted = list[Setting]()
         for change in changes:
-            with contextlib.suppress(ValueError):
+            label = " ".join(map(str, change.values()))
+            try:
                 values = {part: changed_part(self.scene, part, change)}
-                label = "" if own.items() >= change.items() else _words(part, change)
                 scene = self._with(self.scene, values)
                 scene.points()[0].process  # noqa: B018 - refused only when it is made
-                admitted.append((label, values, scene))
-        if admitted and part == "shear" and self.is_of_moment:
-            return self._by_response(admitted)
-        reference = self._sample(admitted[-1][2]) if admitted else None
-        if reference is None and admitted:
-            raise self._too_long(admitted[-1][2])
-        result = list[Setting]()
-        for label, values, scene in admitted:
-            sample = self._sample(scene)
-            if sample is not None and reference is not None:
-                error = self.difference(sample, reference)
-                result.append(
-                    Setting(label, values, error, *_counted_step(scene), _random(scene))
-                )
-        return result
+            except ValueError as fault:
+                self.left_out.append(f"{label}: " + str(fault).partition("\n")[0])
+                continue
+            is_own = own.items() >= change.items()
+            about = Cost(0.0, 0.0), is_own, _random(scene)
+            row = Setting(part, label, change, values, np.zeros((2, 0)), *about)
+            admitted.append(row)
+        if not admitted:
+            return []
+        is_by_law = part == "shear" and self.is_of_moment
+        errors = np.zeros((len(admitted), 2, len(self.names)))
+        fits = [True] * len(admitted)
+        if not is_by_law or self.is_path.any():
+            # the finest first, with which the others are compared
+            samples = [self._sampled(row) for row in admitted[::-1]][::-1]
+            fits = [sample is not None for sample in samples]
+            best = max((k for k, fit in enumerate(fits) if fit), default=-1)
+            needed = next(k for k, row in enumerate(admitted) if row.is_own)
+            if best < min(needed + 1, len(admitted) - 1):
+                raise self._too_long(self._with(self.scene, admitted[-1].values))
+            self.lacks_finest = self.lacks_finest or best < len(admitted) - 1
+            for k, sample in enumerate(samples):
+                if sample is not None and (reference := samples[best]) is not None:
+                    errors[k] = difference(sample, reference, self.written.unit)
+        if is_by_law:
+            laws = [self._laws(row) for row in admitted]
+            for k, law in enumerate(laws):
+                of_law = self._by_law(law, laws[-1])
+                errors[k] = np.where(self.is_path, errors[k], of_law)
+        left_out = [row for row, fit in zip(admitted, fits, strict=True) if not fit]
+        for row in left_out:
+            is_unresolved = self.pilots.is_unresolved(self._scene_of(row))
+            reason = _UNRESOLVED if is_unresolved else _TOO_LONG
+            self.left_out.append(f"{row.label}: {reason}")
+        return [
+            row._replace(error=error, cost=self.pilots.cost(self._scene_of(row)))
+            for row, error, fit in zip(admitted, errors, fits, strict=True)
+            if fit
+        ]
 
-    @property
+    def _scene_of(self, row: Setting) -> Scenario:
+        """Return the scene at a setting."""
+        return self._with(self.scene, row.values)
+
+    def _sampled(self, row: Setting) -> Sample | None:
+        """Return the pilot of a setting."""
+        return self.pilots[self._scene_of(row)]
+
+    @cached_property
+    def is_path(self) -> Array:
+        """True for each name that depends on the course of a member, not on ΔΓ at one moment alone."""
+        events = [not has_mean(name.partition(":")[0]) for name in self.names]
+        return np.array(events) | (not self.is_of_moment)
+
+    @cached_property
     def is_of_moment(self) -> bool:
         """True if ΔΓ has a known law or no noise, and the motion is prescribed.
 
@@ -377,10 +336,12 @@ class Search:
             and not (
                 point.drive.solves_motion or point.contact.lags or point.feels_steps
             )
+            # bonds that members differ in though nothing of them is random follow the area of the past
+            and not (point.population.feeds_back and not point.population.is_random)
             for point in self.scene.points()
         )
 
-    @property
+    @cached_property
     def _smooth(self) -> dict[str, Any]:
         """Return the finest models without noise of parts that are random, with which clock steps are compared."""
         result = dict[str, Any]()
@@ -391,26 +352,27 @@ class Search:
                 result[part] = changed_part(self.scene, part, changes)
         return result
 
-    def _by_response(
-        self, admitted: list[tuple[str, dict[str, Any], Scenario]]
-    ) -> list[Setting]:
-        """Return the settings of the shear model with errors by their laws of ΔΓ, without runs of their own.
+    def _laws(self, row: Setting) -> list[Array]:
+        """Return the moments of ΔΓ of a shear model at the points of the sweep that are compared."""
+        return [
+            _moments(point) for point in spread(self._scene_of(row).points(), POINTS)
+        ]
+
+    def _by_law(self, law: list[Array], finest: list[Array]) -> Array:
+        """Return the error of a shear model by its law of ΔΓ, without runs of its own, shape (2, names).
 
         A cubic in ΔΓ/⟨ΔΓ⟩ − 1 is fitted to the values of the pilot's members at each time. Its mean differs between
-        two models by the differences of their first three moments, which are known in closed form.
+        two models by the differences of their first three moments, which are known in closed form. The influence on a
+        spread is that on its square, so that the spread follows for any difference.
         """
-        result = list[Setting]()
-        laws = [
-            [_moments(point) for point in spread(scene.points(), _POINTS)]
-            for *_, scene in admitted
-        ]
-        for (label, values, scene), law in zip(admitted, laws, strict=True):
-            off = [self._response(k, law[k] - laws[-1][k]) for k in range(len(law))]
-            error = self._in_units(np.concatenate(off, axis=1)).max(axis=1)
-            result.append(
-                Setting(label, values, error, *_counted_step(scene), _random(scene))
-            )
-        return result
+        off = [self._response(k, law[k] - finest[k]) for k in range(len(law))]
+        change = np.concatenate(off, axis=1)
+        is_spread = np.array([name.endswith(":spread") for name in self.names])
+        size = np.where(is_spread[:, np.newaxis], self.written.mean, 0.0)
+        left = np.sqrt(np.maximum(size**2 - 2.0 * size * change, 0.0))
+        change = np.where(is_spread[:, np.newaxis], size - left, change)
+        bound = in_units(change, self.written.unit).max(axis=1)
+        return np.array([bound, np.zeros(len(bound))])
 
     def _response(self, point: int, moments: Array) -> Array:
         """Return bounds of the change of the means by changes of the first three moments at a point of the sweep.
@@ -432,43 +394,90 @@ class Search:
         return changes
 
     def _too_long(self, scene: Scenario) -> NotReached:
-        needed = engineering(2.0 * (self.spent + 3.0 * self._needed(scene)), "s")
+        needed = engineering(2.0 * (self.spent + 3.0 * self.pilots.needed(scene)), "s")
         return NotReached(
             "the finest models do not fit into the budget, so that no error is known; "
             f'give --budget "{needed}"'
         )
 
+    def _pair(self, values: dict[str, Any]) -> tuple[Sample, Sample] | None:
+        """Return the pilots of the scene with some values without noise, where that tells more, and with noise."""
+        smooth = self.pilots[self._with(self.scene, values | self._smooth)]
+        noisy = smooth
+        if self.is_path.any():
+            noisy = self.pilots[self._with(self.scene, values)]
+        return None if smooth is None or noisy is None else (smooth, noisy)
+
+    def _apart(
+        self, pair: tuple[Sample, Sample], reference: tuple[Sample, Sample]
+    ) -> Array:
+        """Return the differences of two pairs, shape (2, names)."""
+        smooth, noisy = (
+            difference(one, other, self.written.unit)
+            for one, other in zip(pair, reference, strict=True)
+        )
+        return np.where(self.is_path, noisy, smooth)
+
     def _of_steps(self) -> list[Setting]:
         """Return clock steps with their systematic errors, the longest first.
 
-        Steps are quartered until the last change is a tenth of the accepted error, or until the next quarter does not
-        fit into the budget. The rest of a series that falls by ``_FALL`` from quarter to quarter is its last change.
+        Steps are quartered until the last change is a tenth of the accepted error or not larger than its noise, or
+        until the next quarter does not fit into the budget. The rest of a series that falls by ``_FALL`` from quarter
+        to quarter is its last change.
         """
-        rows = list[tuple[float, dict[str, Any], Sample]]()
-        scene, smooth = self.scene, self._smooth  # noise hides the errors of steps
+        rows = list[tuple[float, dict[str, Any], tuple[Sample, Sample]]]()
+        scene, small = self.scene, _SMALL * self.goal.within
+        changes = list[Array]()
         for ratio in _RATIOS:
             with contextlib.suppress(ValueError):
                 values = {"clock": step_values(self.scene, ratio)}
-                scene = self._with(self.scene, values | smooth)
-                if (sample := self._sample(scene)) is None:
-                    break
-                rows.append((ratio, values, sample))
+                scene = self._with(self.scene, values)
+                if (pair := self._pair(values)) is None:
+                    if rows:
+                        break
+                    continue
+                rows.append((ratio, values, pair))
             if len(rows) > 1 and ratio < 1.0:
-                last = self.difference(rows[-2][2], rows[-1][2])
-                if last.max() <= _SMALL * self.goal.within:
+                changes.append(self._apart(rows[-2][2], rows[-1][2]))
+                bound, noise = changes[-1]
+                if np.all((bound <= small) | (bound <= 2.0 * noise)):
                     break
         if len(rows) < 2 or rows[-1][0] >= 1.0:
             raise self._too_long(scene)
-        finest = rows[-1][2]
-        rest = self.difference(rows[-2][2], finest) / (_FALL - 1.0)
-        cost, own = _counted_step(self.scene), _random(self.scene)
+        self.trend = self._trend(changes)
+        finest, rest = rows[-1][2], changes[-1] / (_FALL - 1.0)
+        own = _random(self.scene)
         result = list[Setting]()
-        for ratio, values, sample in rows:
-            step = engineering(values["clock"]["step"], "s")
-            label = "" if ratio == 1.0 else f"clock step {step}"
-            error = self.difference(sample, finest) + rest
-            result.append(Setting(label, values, error, *cost, own, ratio))
+        for ratio, values, pair in rows:
+            clock = values["clock"]
+            lines = {key: f"{clock[key]:.12g} s" for key in ("step", "record")}
+            label = engineering(clock["step"], "s")
+            cost = self.pilots.cost(self._with(self.scene, values))
+            error = self._apart(pair, finest) + rest
+            about = error, cost, ratio == 1.0, own, ratio
+            result.append(Setting("clock", label, lines, values, *about))
         return result
+
+    def _trend(self, changes: list[Array]) -> str:
+        """Return in words the largest last change that exceeds its noise and does not fall; "" without one.
+
+        A last change of a tenth of the accepted error is small enough, even if it does not fall.
+        """
+        bound, noise = changes[-1]
+        size, is_small = bound - noise, bound <= _SMALL * self.goal.within
+        grown = np.where((size > noise) & ~is_small, size, 0.0)
+        words = "and no further quarter was tried"
+        if len(changes) > 1:
+            before = changes[-2][0] - changes[-2][1]
+            falls = before - size > np.maximum(noise, changes[-2][1])
+            grown = np.where(falls, 0.0, grown)
+        if not grown.any():
+            return ""
+        worst = int(grown.argmax())
+        last = f"{100.0 * size[worst]:.2g} %"
+        if len(changes) > 1:
+            words = f"after {100.0 * before[worst]:.2g} % by the quarter before"
+        return f"{in_words(self.names[worst])} changes by {last}, {words}"
 
     def choices(self) -> list[Choice]:
         """Return all combinations of one setting a part, the cheapest first. Errors add up, and so does the work.
@@ -476,44 +485,29 @@ class Search:
         Of equal work, that with the fewest changes of the scene comes first. Each has the fewest members that keep the
         accepted error, or else those of the scene.
         """
-        result = [self._combined(rows) for rows in itertools.product(*self.settings())]
+        result = [self._combined(rows) for rows in itertools.product(*self.groups)]
         return sorted(result, key=lambda row: (row.work, len(row.labels), row.total))
 
     def _combined(self, rows: tuple[Setting, ...]) -> Choice:
-        """Return a combination of settings."""
-        batch, each = _counted_step(self.scene)
-        own = np.array([batch, each])
-        costs = [np.array([row.batch, row.each]) for row in rows]
-        batch, each = np.maximum(own + sum(cost - own for cost in costs), 1e-12)
-        systematic = np.sum([row.error for row in rows], axis=0)
-        values = dict[str, Any]()
-        for row in rows:
-            values |= row.values if row.label else {}
-        parts = {part for row in rows[:-1] for part in row.values}
-        is_random = bool(rows[-1].random - parts) or any(
-            row.random & {*row.values} for row in rows[:-1]
-        )
+        """Return a combination of settings, with the members that it needs."""
+        systematic = np.sum([row.error[0] for row in rows], axis=0)
         members, noise = self.scene.ensemble.members, np.zeros(systematic.shape)
-        if is_random:
+        if _is_random(rows):
             members = self.members(self.goal.within - systematic) or members
             noise = self.noise(max(members, 2))
-        advanced = members if is_random else 1
-        cost = float(batch), float(each)
-        return Choice(
-            tuple(row.label for row in rows if row.label),
-            values,
-            members,
-            self._work(cost, rows[-1].ratio, advanced),
-            systematic,
-            noise,
-        )
+        return Choice(rows, members, self.work(rows, members), systematic, noise)
 
-    def _work(self, cost: tuple[float, float], ratio: float, members: int) -> float:
-        """Return the counted work of a run by that of a step of a batch and of a member [s], to three digits."""
+    def work(self, rows: tuple[Setting, ...], members: int) -> float:
+        """Return the counted work of a run [s], to three digits. That of several changes adds up."""
+        own = np.array(self.pilots.cost(self.scene))
+        costs = sum((np.array(row.cost) - own for row in rows), own)
+        batch, each, substeps = np.maximum(costs, [1e-12, 1e-12, 0.0])
+        members = members if _is_random(rows) else 1
         points = self.scene.points()
         batches = -(-members // together(points[0]))
-        steps = len(points) * self.scene.clock.steps / ratio
-        return float(f"{steps * (batches * cost[0] + members * cost[1]):.3g}")
+        steps = self.scene.clock.steps / rows[-1].ratio
+        one = steps * (batches * batch + members * each) + members * substeps
+        return float(f"{len(points) * one:.3g}")
 
     def scene_of(self, choice: Choice) -> Scenario:
         """Return the plain scenario of a choice."""
@@ -525,67 +519,85 @@ class Search:
     @property
     def points(self) -> int:
         """Return the number of points of the sweep at which settings are compared."""
-        return min(_POINTS, len(self.scene.points()))
+        return min(POINTS, len(self.scene.points()))
 
-    def best(self) -> tuple[Choice, Choice]:
-        """Return the cheapest choice that is measured to be within the goal, and the scene as it is written.
+    @cached_property
+    def as_written(self) -> Choice:
+        """The settings of the scene with its members."""
+        row = next(row for row in self.choices() if not row.labels)
+        if not row.noise.any():
+            return row
+        members = self.scene.ensemble.members
+        return row._replace(
+            members=members,
+            work=self.work(row.rows, members),
+            noise=self.noise(max(members, 2)),
+        )
+
+    @cached_property
+    def finest(self) -> Choice:
+        """The combination of the least error, with which others are compared."""
+        return min(self.choices(), key=lambda row: (row.systematic.max(), row.work))
+
+    def best(self) -> Choice:
+        """Return the cheapest choice that is measured to be within the goal.
 
         Raises
         ------
         NotReached
-            If none is within the goal; the message tells what is.
+            If none is within the goal, with what is, or if the result does not converge as the clock step decreases.
         """
         rows = self.choices()
-        written = next(row for row in rows if not row.labels)
-        members = self.scene.ensemble.members
-        if written.noise.any():
-            written = written._replace(
-                members=members,
-                work=self._work(_counted_step(self.scene), 1.0, members),
-                noise=self.noise(max(members, 2)),
+        if self.trend:
+            raise NotReached(
+                f"convergence is not shown: with the last quarter of the clock step {self.trend}; "
+                "a larger --budget may try a finer step"
             )
-        finest = min(rows, key=lambda row: (row.systematic.max(), row.work))
-        for row in rows:
-            if (
-                row.total <= self.goal.within
-                and self.spent + row.work <= self.goal.budget
-            ):
-                measured = self._measured(row, finest)
-                if measured.total <= self.goal.within:
-                    return measured, written
         fits = [row for row in rows if self.spent + row.work <= self.goal.budget]
+        for row in fits:
+            if row.total <= self.goal.within:
+                result = self._measured(row)
+                if result.total <= self.goal.within:
+                    return result
         closest = min(fits or rows, key=lambda row: (row.total, row.work))
         settings = ", ".join((*closest.labels, f"{closest.members:,} members"))
         raise NotReached(
-            f"{_accepted(self.goal.within)} is not reached within a budget of "
+            f"{accepted(self.goal.within)} is not reached within a budget of "
             f"{engineering(self.goal.budget, 's')}; the least bound that was found is "
-            f"{_percent(closest.total)}, with {settings}; a larger --budget may find less"
+            f"{percent(closest.total)}, with {settings}; a larger --budget may find less"
         )
 
-    def _measured(self, row: Choice, finest: Choice) -> Choice:
+    def _measured(self, row: Choice) -> Choice:
         """Return a choice with the error of the combination, measured against that of the finest settings.
 
-        Its members are those that this error needs. If the pilots do not fit into the budget, the sum of the single
-        errors stands.
+        Its members are those that this error needs. Errors by the law of ΔΓ are added. If the pilots do not fit into
+        the budget, the sum of the single errors stands.
         """
-        if self.is_of_moment:  # where the sum of the errors has no noise to speak of
+        pair, reference = self._pair(row.values), self._pair(self.finest.values)
+        if pair is None or reference is None:
             return row
-        sample = self._sample(self._with(self.scene, row.values))
-        reference = self._sample(self._with(self.scene, finest.values))
-        if sample is None or reference is None:
-            return row
-        systematic = self.difference(sample, reference) + finest.systematic
+        systematic = self._apart(pair, reference)[0] + self.finest.systematic
+        for setting in row.rows:
+            if setting.part in self._smooth:
+                systematic += np.where(self.is_path, 0.0, setting.error[0])
         members, noise = row.members, row.noise
         if noise.any():
             members = self.members(self.goal.within - systematic) or members
             noise = self.noise(max(members, 2))
-        work = row.work * members / row.members
+        work = self.work(row.rows, members)
         return row._replace(
-            members=members,
-            work=float(f"{work:.3g}"),
-            systematic=systematic,
-            noise=noise,
+            members=members, work=work, systematic=systematic, noise=noise
         )
+
+
+class Comparison(Search):
+    """The search for the cheapest models and clock step, with the members of the scene, whose noise is not weighed."""
+
+    def noise(self, members: int) -> Array:
+        return np.zeros(len(self.names))
+
+    def members(self, left: Array) -> int:
+        return self.scene.ensemble.members
 
 
 def _without_auto(scenario: Scenario) -> dict[str, Any]:
@@ -600,11 +612,12 @@ def _without_auto(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _counted_step(scenario: Scenario) -> tuple[float, float]:
-    """Return the counted work of a step of a batch, and of each of its members [s], as means over the sweep."""
-    points = spread(scenario.points(), _POINTS)
-    batch = float(np.mean([seconds_a_step(point, 0) for point in points]))
-    return batch, float(np.mean([seconds_a_step(point, 1) for point in points])) - batch
+def _is_random(rows: tuple[Setting, ...]) -> bool:
+    """Return True if members differ in a combination of settings."""
+    parts = {row.part for row in rows[:-1]}
+    return bool(rows[-1].random - parts) or any(
+        row.part in row.random for row in rows[:-1]
+    )
 
 
 def _random(scenario: Scenario) -> frozenset[str]:
@@ -631,16 +644,23 @@ def _moments(point: Scenario) -> Array:
     return np.array([0.0, second / first**2, 2.0 * third / first**3])
 
 
-def _words(part: str, changes: dict[str, Any]) -> str:
-    return f"{part} " + " ".join(map(str, changes.values()))
+def _named(row: Setting) -> str:
+    """Return a setting in words."""
+    return f"{'clock step' if row.part == 'clock' else row.part} {row.label}"
 
 
-def _accepted(error: float) -> str:
+def in_words(name: str) -> str:
+    """Return a name that is compared in words: ``contact_area:spread`` is the spread of the contact area."""
+    quantity, _, statistic = name.partition(":")
+    return f"{statistic} of " * bool(statistic) + quantity.replace("_", " ")
+
+
+def accepted(error: float) -> str:
     """Return an accepted error as it was given."""
     return f"{100.0 * error:.6g} %"
 
 
-def _percent(bound: float) -> str:
+def percent(bound: float) -> str:
     """Return a bound with three digits, rounded up, and one that is as large as the quantity without digits."""
     percent = 100.0 * bound
     if not 0.0 < percent < 99.0:
@@ -671,10 +691,14 @@ def answer(scenario: Scenario, goal: Goal) -> Answer:
     BadInput
         If a quantity has no mean over time, or the field is a measured map.
     """
-    search, best, written_choice = _searched(scenario, goal)
+    result = searched(scenario, goal)
+    search, best, as_written = result.search, result.best, result.search.as_written
+    if best is None or search.lacks_finest:
+        left_out = "; ".join(search.left_out)
+        raise NotReached(result.reason or f"not compared with {left_out}")
     scene = search.scene_of(best)
     parts = [
-        f"{name.replace('_', ' ')} {_percent(float(bound + noise))}"
+        f"{in_words(name)} {percent(float(bound + noise))}"
         for name, bound, noise in zip(
             search.names, best.systematic, best.noise, strict=True
         )
@@ -685,11 +709,10 @@ def answer(scenario: Scenario, goal: Goal) -> Answer:
     count = len(scene.points())
     if search.points < count:
         settings.append(f"judged at {search.points} of {count} points of the sweep")
-    as_written = _percent(written_choice.total)
     sentence = (
-        f"within {_accepted(goal.within)}: errors of at most {', '.join(parts)}; "
+        f"within {accepted(goal.within)}: errors of at most {', '.join(parts)}; "
         f"{', '.join(settings)}, {engineering(best.work, 's')} of counted work "
-        f"(as written: {engineering(written_choice.work, 's')}, within {as_written})"
+        f"(as written: {engineering(as_written.work, 's')}, within {percent(as_written.total)})"
     )
     budget = {
         name: {"systematic": float(bound), "noise": float(noise)}
@@ -706,36 +729,51 @@ def answer(scenario: Scenario, goal: Goal) -> Answer:
     return Answer(scene, sentence, attributes)
 
 
-def _searched(scenario: Scenario, goal: Goal) -> tuple[Search, Choice, Choice]:
-    """Return the search with its best choice, and the scene as written, by the smallest pilot that shows it.
+class Result(NamedTuple):
+    """A search with its best choice; None, with the reason, if the goal is not reached."""
+
+    search: Search
+    best: Choice | None
+    reason: str = ""
+
+    @property
+    def work(self) -> float:
+        """The counted work of the best choice [s], inf without one."""
+        return math.inf if self.best is None else self.best.work
+
+
+def searched(scenario: Scenario, goal: Goal, kind: type[Search] = Search) -> Result:
+    """Return the search of a kind by the smallest pilot that reaches a goal, or a larger one if that pays.
 
     Raises
     ------
     NotReached
-        If no pilot within the budget shows it.
+        If no pilot shows an error within the budget.
     """
-    spent, fault = 0.0, None
-    result: tuple[Search, Choice, Choice] | None = None
+    spent = 0.0
+    results = list[Result]()
     for pilot in _PILOTS:
         before = spent
         try:
-            search = Search(scenario, goal, pilot, spent)
-        except NotReached as too_long:
-            fault = fault or too_long
+            search = kind(scenario, goal, pilot, spent)
+            search.groups  # noqa: B018 - raises if no error is known
+        except NotReached:
+            if not results:
+                raise
+            break
+        if results and search.lacks_finest > results[0].search.lacks_finest:
             break
         try:
-            best, as_written = search.best()
-            if result is None or best.work < result[1].work:
-                result = search, best, as_written
-        except NotReached as reason:
-            fault = reason
+            results.append(Result(search, search.best()))
+        except NotReached as fault:
+            results.append(Result(search, None, str(fault)))
         spent = search.spent
-        is_cheap = result and result[1].work < _WORTH_MORE * (spent - before)
+        is_cheap = results[-1].work < _WORTH_MORE * (spent - before)
         if is_cheap or not search.of_one.any():  # noise of pilots decides nothing more
             break
-    if result is None:
-        raise cast(NotReached, fault)
-    return result
+    # of results that cost the same the first, but the last of those that are none
+    reached = [row for row in results if row.best]
+    return min(reached, key=lambda row: row.work, default=results[-1])
 
 
 def _known(document: dict[str, Any]) -> dict[str, Any]:

@@ -134,6 +134,11 @@ class _BondModel(Part):
         """Return the mean number of bond lives that are followed in a step of one member at speeds [m/s]."""
         return 0.0
 
+    @property
+    def substep_seconds(self) -> float:
+        """Rough time of a sub-step of a driven member, for estimates [s]."""
+        return 1.5e-6
+
 
 class _OverArea(_BondModel):
     """Attributes of models whose population may be carried with the contact area of each member."""
@@ -762,6 +767,11 @@ class Cohort(_OverArea, _OfEachBond):
 
     state_class: ClassVar[type[Ages]] = Ages
     step_seconds: ClassVar[float] = 10e-6
+
+    @property
+    def substep_seconds(self) -> float:
+        # the number of cohorts grows as the tolerance falls
+        return 1e-6 * self.tolerance**-0.3
 
     def start(self, motion: Motion, noise: Noise) -> Ages:
         if self.start_from == "steady":
