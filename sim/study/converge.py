@@ -95,7 +95,11 @@ def converge(
     """
     own = float(part_table(scenario.shear).get("tolerance", 0.01))
     goal = Goal(tolerance or own, of, budget, shown)
-    result = searched(scenario, goal, Comparison)
+    return report(searched(scenario, goal, Comparison))
+
+
+def report(result: Result) -> xr.Dataset:
+    """Return a search with its recommendation as a dataset; see ``converge``."""
     search = result.search
     settings = [row for group in search.groups for row in group]
     members = search.scene.ensemble.members
@@ -124,10 +128,10 @@ def converge(
         {"row": [row.label for row in settings], "name": search.names},
         {
             "Conventions": "CF-1.11",
-            "title": f"speed against error: {scenario.name}",
+            "title": f"speed against error: {search.scene.name}",
             "sim_version": importlib.metadata.version("sliding-sim"),
-            "seed": str(scenario.seed),
-            "tolerance": goal.within,
+            "seed": str(search.scene.seed),
+            "tolerance": search.goal.within,
             "members": search.pilot,
             "left_out": "; ".join(search.left_out),
             "recommendation": _recommendation(result),

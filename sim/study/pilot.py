@@ -101,12 +101,11 @@ class Cost(NamedTuple):
 
 def usual(dataset: xr.Dataset) -> list[str]:
     """Return the names that ``--within`` compares: means of a contact, and times of the events that the table shows."""
-    known = closed_observables(dataset, None)
+    known = possible(dataset)
     shown = {column.name for column in highlights(Run(dataset)).columns}
-    times = {_TIME_OF.get(name, name) for name in shown} & {*TIMES}
-    return [name for name in USUAL if name in known] + [
-        name for name in TIMES if name in times
-    ]
+    times = {_TIME_OF.get(name, name) for name in shown}
+    names = [*USUAL, *(name for name in TIMES if name in times)]
+    return [name for name in names if name in known]
 
 
 def shown(dataset: xr.Dataset) -> list[str]:
@@ -118,16 +117,19 @@ def shown(dataset: xr.Dataset) -> list[str]:
     run_of_pilot = Run(dataset)
     over_time = [column.name for column in table(run_of_pilot).columns]
     once = [column.name for column in highlights(run_of_pilot).columns]
-    known, happened = closed_observables(dataset, None), events(dataset)
-    names = [name for name in over_time if name in known and has_mean(name)]
+    known, values = possible(dataset), closed_observables(dataset, None)
+    names = [name for name in over_time if name in known]
     if "substeps" not in dataset and MEMBERS in dataset.dims:
-        varying = [name for name in names if MEMBERS in known[name].dims]
-        names += [
-            f"{name}:spread"
-            for name in varying
-            if QUANTITIES[name].form is not Form.SHARE
-        ]
-    return names + [name for name in once if name in happened and name not in names]
+        varying = (name for name in names if MEMBERS in values[name].dims)
+        names += [f"{name}:spread" for name in varying if not _is_share(name)]
+    return names + [name for name in once if name in known and name not in names]
+
+
+def possible(dataset: xr.Dataset) -> set[str]:
+    """Return the quantities that have a mean over time or a number for each member."""
+    over_time, once = map(str, closed_observables(dataset, None)), events(dataset)
+    result = {name for name in over_time if has_mean(name)}
+    return result | {n for n, one in once.items() if {*one.value.dims} <= {MEMBERS}}
 
 
 class Pilots:
@@ -264,20 +266,14 @@ class Pilots:
 
 def _check(names: Iterable[str], datasets: Iterable[xr.Dataset]) -> None:
     """Raise an error if a name is compared at no point of a sweep, of which these are the datasets."""
-    possible = set[str]()
-    for dataset in datasets:
-        possible |= {
-            n for n in map(str, closed_observables(dataset, None)) if has_mean(n)
-        }
-        once = events(dataset)
-        possible |= {n for n, one in once.items() if {*one.value.dims} <= {MEMBERS}}
+    known = {name for dataset in datasets for name in possible(dataset)}
     for name in names:
         quantity, _, statistic = name.partition(":")
-        if quantity not in possible or statistic not in STATISTICS:
+        if quantity not in known or statistic not in STATISTICS:
             raise BadInput(
                 [
                     f"accuracy.of: {name} is not compared; known: "
-                    f"{', '.join(sorted(possible))}, alone or with :spread, :skewness"
+                    f"{', '.join(sorted(known))}, alone or with :spread, :skewness"
                 ]
             )
 
