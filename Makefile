@@ -87,7 +87,7 @@ PYTHON311 = python3.11
 windows:
 	$(PYTHON311) tests/windows/wine.py all $(WINDOWS)
 
-# `make bench` measures all rows of docs/speed.md, `make bench ROWS="modal disc"` those of some groups.
+# `make bench` measures all rows of docs/speed_rows.md, `make bench ROWS="modal disc"` those of some groups.
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.run $(ROWS)
 

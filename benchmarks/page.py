@@ -1,10 +1,35 @@
-"""The page of the benchmarks, ``docs/speed.md``, from the rows that are stored."""
+"""The pages of the benchmarks, ``docs/speed.md`` and ``docs/speed_rows.md``, from the rows that are stored."""
 
 from typing import Any
 
 from benchmarks.timing import Row
 
-TITLE = """# Speed
+OPENING = """# Speed
+
+The cost of a run follows from the error that you accept. These pictures show the largest error of each setting of two
+questions over the CPU time of a run on one core. A ring marks the scenario as written, a star the combination that is
+recommended for 1 %:
+
+![Error over CPU time of a lens with a friction maximum](precision/friction_maximum.png)
+
+![Error over CPU time of a PDMS lens with fluctuations](precision/pdms_lens.png)
+
+[Work and precision](precision.md) has those of further questions and the command that makes them. `sim converge
+SCENARIO.toml` finds the error of each setting of a scenario of your own, and [`sim run --within`](within.md) takes the
+cheapest one.
+
+Beside other programs for the same work:
+
+"""
+#: Works of the rows that open the page, each with the program beside it.
+CHOSEN = (
+    ("banded at 1 %, 512²: run to netCDF, 1024 members × 10⁴ steps", "rfft2"),
+    ("modal, 512²: a step of a run", "only pairs"),
+    ("counted, 10⁴ bonds", "numpy's"),
+    ("tracked, 20 members of 10⁴ bonds, at 1000 steps", "numpy"),
+    ("massless slider behind a spring", "LSODA"),
+)
+TITLE = """# Speed, row by row
 
 This page compares the CPU time of `sim` with that of other programs. `make bench` measures every row below and writes
 the page. To measure only some groups of rows:
@@ -33,7 +58,7 @@ numpy and scipy would write for the same work. Other rows compare ours with one 
 
 """
 END = """
-The command `sim converge SCENARIO.toml` measures the cost and the error of each model on a scenario of your own.
+[All rows, and how they are measured](speed_rows.md). `make bench` measures them.
 """
 HEADINGS = (
     "work",
@@ -46,17 +71,29 @@ HEADINGS = (
 )
 
 
+def opening(results: dict[str, Any]) -> str:
+    """The page with which a reader begins."""
+    rows = rows_of(results)
+    lines = [
+        next(row for row in rows if row.ours.startswith(work) and beside in row.beside)
+        for work, beside in CHOSEN
+    ]
+    return OPENING + _table(lines) + END
+
+
 def text(results: dict[str, Any]) -> str:
-    """The page."""
+    """The page of all rows."""
     machines = sorted(
         {f"{group['date']}, {group['machine']}" for group in results.values()}
     )
-    lines = [TITLE, "Measured: ", "; ".join(machines), ".\n\n"]
-    lines += [
-        f"| {' | '.join(line)} |\n" for line in (HEADINGS, ["---"] * len(HEADINGS))
-    ]
-    lines += [f"| {' | '.join(cells(row))} |\n" for row in rows_of(results)]
-    return "".join([*lines, END])
+    measured = f"Measured: {'; '.join(machines)}.\n\n"
+    return TITLE + measured + _table(rows_of(results))
+
+
+def _table(rows: list[Row]) -> str:
+    """A table of rows."""
+    lines = [HEADINGS, ["---"] * len(HEADINGS), *map(cells, rows)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def rows_of(results: dict[str, Any]) -> list[Row]:

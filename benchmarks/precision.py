@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.precision [NAME ...]`` finds the errors of all questions or some as ``sim converge`` does,
 measures the CPU time of a run at each setting, draws ``docs/precision/NAME.png``, and writes ``docs/precision.md``. The
-numbers are kept in ``benchmarks/precision.json``. With ``--write`` it measures nothing. A question whose models do not
-fit into the budget keeps the reason in place of numbers.
+numbers are kept in ``benchmarks/precision.json``. With ``--write`` it only draws and writes. A question whose models do
+not fit into the budget keeps the reason in place of numbers.
 """
 
 import json
@@ -15,10 +15,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import sim
-from benchmarks.plain import HalfSpectrumModes
 from benchmarks.run import ROOT
 from sim.ensemble.simulate import run
-from sim.plots.style import REFERENCE, legend, save
+from sim.plots.style import save
 from sim.scenario.scenario import Scenario
 from sim.study.converge import figure, report
 from sim.study.within import Comparison, Goal, NotReached, searched
@@ -28,18 +27,19 @@ NUMBERS = ROOT / "benchmarks" / "precision.json"
 PAGE, FOLDER = ROOT / "docs" / "precision.md", ROOT / "docs" / "precision"
 #: Accepted error, and counted work of a search [s].
 WITHIN, BUDGET = 0.01, 30.0
-#: Runs of which the fastest counts, and steps of the plain program.
-_RUNS, _STEPS = 2, 20
+#: Runs of which the fastest counts.
+_RUNS = 2
+#: Counted work of a run that is measured with all members [s].
+_LONG = 1.0
 TITLE = """# Work and precision
 
 Each picture belongs to a question of the [gallery](gallery/README.md). It shows the error of each setting over the CPU
 time of a run with all members, on one core. The error is the largest one of contact area, contact radius, friction
 force, bond fraction and times of events, as [State an error](within.md) defines it. A ring marks the scenario as
-written, a star the combination that is recommended for 1 %. A grey diamond is a plain numpy program that advances the
-modes of the same stress field on its grid, without bonds and contact: it draws one complex number for each pair of
-modes with power. It has no error of a model, so it stands at the bottom.
+written, a star the combination that is recommended for 1 %. Exact settings stand at the bottom. A long run is measured
+with a part of its members.
 
-The command `python -m benchmarks.precision` measures all of them, and `python -m benchmarks.precision masking` one.
+The command `python -m benchmarks.precision` measures all of them, and `python -m benchmarks.precision pdms_lens` one.
 
 """
 
@@ -49,30 +49,16 @@ def names() -> list[str]:
     return sorted(json.loads((ROOT / "docs/gallery/numbers.json").read_text("utf-8")))
 
 
-def seconds(scenario: Scenario) -> float:
-    """CPU time of a run [s], the least of some."""
-    times = []
+def seconds(scenario: Scenario, work: float) -> float:
+    """CPU time of a run [s], the least of some; if its counted work is long, of a part of the members."""
+    members, times = scenario.ensemble.members, []
+    part = max(min(members, 8), round(members * min(1.0, _LONG / work)))
+    scenario = scenario.with_values({"ensemble.members": part}, built=False)
     for _ in range(_RUNS):
         before = time.process_time()
         run(scenario)
         times.append(time.process_time() - before)
-    return min(times)
-
-
-def plain_seconds(scenario: Scenario) -> float | None:
-    """CPU time of the modes alone in numpy [s]; None if the scene has no modes on a grid."""
-    shear = scenario.fluctuations
-    if not shear.per_member or getattr(shear, "points", None) is None:
-        return None
-    density = shear.spectrum.density
-    grid = shear.points, shear.cell, lambda q: density(q, 0.0 * q)
-    modes = HalfSpectrumModes(*grid, scenario.solid.shear_modulus, 1)
-    before = time.process_time()
-    for _ in range(_STEPS):
-        modes.step(0.01)
-    one = (time.process_time() - before) / _STEPS
-    count = scenario.clock.steps * scenario.ensemble.members
-    return one * count * len(scenario.points())
+    return min(times) * members / part
 
 
 def measured(scenario: Scenario) -> dict[str, Any]:
@@ -80,11 +66,13 @@ def measured(scenario: Scenario) -> dict[str, Any]:
     result = searched(scenario, Goal(WITHIN, (), BUDGET), Comparison)
     search, dataset = result.search, report(result)
     settings = [row for group in search.groups for row in group]
-    dataset["work"].values[:] = [seconds(search._scene_of(row)) for row in settings]
-    if result.best is not None:
-        dataset.attrs["recommended_work"] = seconds(search.scene_of(result.best))
-    if (plain := plain_seconds(search.scene)) is not None:
-        dataset.attrs["plain_work"] = plain
+    works = dataset["work"].to_numpy().tolist()
+    dataset["work"].values[:] = [
+        seconds(search._scene_of(row), work)
+        for row, work in zip(settings, works, strict=True)
+    ]
+    if (best := result.best) is not None:
+        dataset.attrs["recommended_work"] = seconds(search.scene_of(best), best.work)
     return dataset.to_dict()
 
 
@@ -93,10 +81,6 @@ def drawn(dataset: xr.Dataset) -> Figure:
     picture = figure(dataset)
     (panel,) = picture.axes
     panel.set_xlabel("CPU time of the run (s)")
-    if plain := dataset.attrs.get("plain_work"):
-        floor = min(min(line.get_ydata()) for line in panel.lines[:-1])
-        panel.plot(plain, floor, "D", c=REFERENCE, ms=4.0, label="numpy, modes alone")
-        legend(panel)
     return picture
 
 
@@ -124,12 +108,15 @@ def main() -> None:
             continue  # a question about another scenario's run
         try:
             numbers[name] = measured(sim.load(path))
-            save(drawn(xr.Dataset.from_dict(numbers[name])), FOLDER / f"{name}.png")
         except (NotReached, BadInput) as fault:
             numbers[name] = {"reason": str(fault)}
         kept = json.dumps(dict(sorted(numbers.items())), ensure_ascii=False, indent=1)
         NUMBERS.write_text(kept + "\n", encoding="utf-8")
-    PAGE.write_text(text(dict(sorted(numbers.items()))), encoding="utf-8")
+    numbers = dict(sorted(numbers.items()))
+    PAGE.write_text(text(numbers), encoding="utf-8")
+    for name, one in numbers.items():
+        if "reason" not in one:
+            save(drawn(xr.Dataset.from_dict(one)), FOLDER / f"{name}.png")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """Speed beside plain numpy and scipy, and goals: ``make bench``.
 
 ``python -m benchmarks.run [GROUP ...]`` measures all groups of rows or some, keeps them in ``benchmarks/results.json``
-beside those of the other groups, and writes ``docs/speed.md`` of all that is kept. With ``--write``
-it measures nothing.
+beside those of the other groups, and writes ``docs/speed.md`` and ``docs/speed_rows.md`` of all that is kept. With
+``--write`` it measures nothing.
 """
 
 import datetime
@@ -21,7 +21,12 @@ from benchmarks import bonds, contact, fields, page, spring, whole
 from benchmarks.timing import Bench, Row
 
 ROOT = Path(__file__).parent.parent
-RESULTS, PAGE = ROOT / "benchmarks" / "results.json", ROOT / "docs" / "speed.md"
+RESULTS = ROOT / "benchmarks" / "results.json"
+#: Each page with the function that writes it.
+PAGES = {
+    ROOT / "docs" / "speed.md": page.opening,
+    ROOT / "docs" / "speed_rows.md": page.text,
+}
 #: One core for each program, and memory that is freed stays with the process.
 ENVIRONMENT = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR")
@@ -78,7 +83,8 @@ def main() -> None:
         RESULTS.write_text(
             json.dumps(results, ensure_ascii=False, indent=1) + "\n", encoding="utf-8"
         )
-    PAGE.write_text(page.text(results), encoding="utf-8")
+    for path, text in PAGES.items():
+        path.write_text(text(results), encoding="utf-8")
 
 
 def machine() -> str:

@@ -14,7 +14,7 @@ from helpers.cases import some
 from helpers.parts import load
 from numpy.testing import assert_allclose
 
-from benchmarks import gate, page, run, scenes, timing
+from benchmarks import gate, page, precision, run, scenes, timing
 from benchmarks.compare import interval
 from benchmarks.lines import (
     called_once,
@@ -42,9 +42,14 @@ def test_every_row_runs_and_is_kept(group):
         )
 
 
-def test_the_page_of_speed_is_that_of_the_results():
-    found = run.PAGE.read_text(encoding="utf-8")
-    assert found == page.text(RESULTS), "run make bench"
+def test_the_pages_of_speed_and_precision_are_those_of_the_results():
+    for path, text in run.PAGES.items():
+        found = path.read_text(encoding="utf-8")
+        assert found == text(RESULTS), "run make bench"
+    numbers = json.loads(precision.NUMBERS.read_text(encoding="utf-8"))
+    assert precision.PAGE.read_text(encoding="utf-8") == precision.text(numbers)
+    pictures = {path.stem for path in precision.FOLDER.iterdir()}
+    assert pictures == {name for name, one in numbers.items() if "reason" not in one}
     assert list(RESULTS) == list(run.GROUPS)
     assert len(re.findall(r"\| (?:yes|\*\*no\*\*) \|", found)) == sum(
         row.met is not None for row in page.rows_of(RESULTS)

@@ -15,6 +15,7 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from sim.numerics import files, hdf5, lazy
 from sim.plots.style import (
@@ -238,6 +239,10 @@ def figure(dataset: xr.Dataset) -> Figure:
             panel.plot(about["recommended_work"], error, "*", **star)
         panel.axhline(tolerance, c=REFERENCE, ls="--", lw=0.8, label="accepted")
         panel.set(xscale="log", xlabel="counted work of the run (s)")
+        ends = np.log10([work.min(), work.max()])
+        # whole decades, because labels between them overlap
+        panel.set_xlim(0.8 * 10.0 ** np.floor(ends[0]), 1.25 * 10.0 ** np.ceil(ends[1]))
+        panel.xaxis.set_minor_formatter(NullFormatter())
         panel.set(yscale="log", ylabel="largest error (bottom: exact)")
         legend(panel)
     return picture

@@ -202,7 +202,8 @@ def judged(name):
     """
     scene, held = sim.load(accuracy_scene(name)), list[bool]()
     is_noisy = name in SPRINGS and scene.is_random
-    members = 20_000 if name in NAMED else 4096
+    is_wide = name in NAMED or scene.bonds.model == "tracked"
+    members = 20_000 if is_wide else 4096
     reference = _means(_finest(scene, 512 if name in SPRINGS else members))
     targets = (0.05, 0.01, 0.003) if name in NAMED and not is_noisy else (0.05, 0.01)
     units = {quantity: np.abs(mean).max() for quantity, (mean, _) in reference.items()}
