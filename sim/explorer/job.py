@@ -139,6 +139,11 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
             )
             for mean, half in [_interval(values)]
         ]
+        # heavy: for motions alone
+        from sim.plots.curves import coarse_slips
+        from sim.read.tables import unresolved
+
+        words += filter(None, [coarse_slips(dataset), unresolved(dataset)])
         return {"along": "t", "members": members, "words": ", ".join(words)}
     if float(np.ptp(speed.to_numpy())) == 0.0:
         data = data.isel(t=slice(data.sizes["t"] // 2, None)).mean("t").expand_dims("t")

@@ -43,6 +43,8 @@ _FACTOR, _TIMES = 30.0, 4.0
 _CLEAR = 1.01
 #: Loads of further curves over the scenario's; most curves of other points of a sweep.
 _LOADS, _MOST_OTHERS = (0.25, 4.0), 8
+#: Length of the way of a quantity over its range, above which it is not drawn beside others.
+_TURNS = 30.0
 #: Longest time of the motions of other points [s].
 _LONGEST = 8.0
 #: Members of the band, time that it may take [s], and time after which it is tried again [s].
@@ -347,9 +349,12 @@ class Page:
         if self._map or len(changes) > _MOST_OTHERS or estimate > _LONGEST:
             return
         own = course(scene) if changes else {}
-        for other, change in changes:
-            if (columns := course(other)) != own:
-                yield {"label": _words_of(scene, change), "columns": columns}
+        courses = [(_words_of(scene, change), course(one)) for one, change in changes]
+        hidden = {n for _, columns in courses for n in columns if _is_busy(columns[n])}
+        for label, columns in courses:
+            if columns != own:
+                shown = {name: x for name, x in columns.items() if name not in hidden}
+                yield {"label": label, "columns": shown}
 
     def _other_points(self, scene: Scenario, swept: str | None) -> Iterator[Any]:
         """Yield the changes of a scenario to the other points of its sweep, at most eight."""
@@ -586,6 +591,13 @@ def _effect(
             )
             result = max(result or 0.0, float(np.max(np.abs(lost))))
     return result
+
+
+def _is_busy(column: list[float | None]) -> bool:
+    """Return True if a course turns so often that several of them are no lines any more."""
+    values = np.array(column, float)
+    values = values[np.isfinite(values)]
+    return bool(np.sum(np.abs(np.diff(values))) > _TURNS * np.ptp(values))
 
 
 def _is_close(one: Array, other: Array) -> bool:

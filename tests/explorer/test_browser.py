@@ -1045,7 +1045,10 @@ AXE = Path(sim.__file__).parents[1] / "node_modules" / "axe-core" / "axe.min.js"
 
 
 @pytest.mark.skipif(not AXE.exists(), reason="make page installs axe-core")
-@pytest.mark.parametrize("name", ["pdms_lens", "pdms_lens_spring", "masking"])
+@pytest.mark.parametrize(
+    "name",
+    ["pdms_lens", "pdms_lens_spring", "masking", "measured_lens", "stability_map"],
+)
 @pytest.mark.parametrize(
     "looks", [{}, {"color_scheme": "dark"}, {"viewport": {"width": 390, "height": 800}}]
 )

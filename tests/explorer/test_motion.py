@@ -104,3 +104,9 @@ def test_a_run_of_a_motion_states_the_extremes_of_its_members_with_intervals(spr
     half = 3.182446305284263 * largest.std(ddof=1) / 2.0
     words = f"{engineering(largest.mean(), 'N')} ± {engineering(half, 'N')}"
     assert f"largest friction {words}" in drawn["words"]
+
+
+def test_a_run_whose_slips_are_not_resolved_says_so_and_another_one_does_not(spring):
+    assert "not resolved" not in summary(spring, sim.run(spring))["words"]
+    coarse = spring.with_values({"clock.record": 10e-3})
+    assert "not resolved" in summary(coarse, sim.run(coarse))["words"]

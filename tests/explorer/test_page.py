@@ -524,6 +524,14 @@ def test_motions_at_other_points_of_the_sweep_keep_the_extremes_of_their_runs():
         for one in Page(scene).others({"contact.stiffness": 34.0}, "motion")["others"]
     ]
     assert "k = 34 N/m" not in labels and "k = 340 N/m" in labels
+    # many slips of several points are no lines any more
+    clutch = Page(sim.load("scenarios/motor_clutch.toml")).others({}, "motion")[
+        "others"
+    ]
+    assert len(clutch) == 7
+    for one in clutch:
+        assert "slider_position" in one["columns"]
+        assert "friction_force" not in one["columns"]
     bead = Page(sim.load("scenarios/soft_bead.toml")).others({}, "motion")["others"]
     assert [one["label"] for one in bead] == ["profile = circle"]
 

@@ -390,6 +390,8 @@ function plot(state, { isDark, isNarrow }) {
   const about = { width: drawn.width, theme: look, title: name, description, shared: drawn.shared };
   drawn.node = figure(mark ? shown.map((panel) => ({ ...panel, marks: [...panel.marks, mark] })) : shown, about);
   $("plot").replaceChildren(built(drawn.node));
+  // a figure that is higher than a small screen would hide what is below it if it stayed in sight
+  $("plot").classList.toggle("tall", Number(drawn.node.attributes.height) > 330);
   $("plot").dataset.of = JSON.stringify(valuesOf(state));
   $("plot").dataset.share = state.answers.curves?.of.share;
   if ($("numbers").open) {
