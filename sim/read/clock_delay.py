@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from sim.laws.schallamach import delay_by_steps
-from sim.read.dataset import MEMBERS, setting, word
+from sim.read.dataset import MEMBERS, ensemble_mean, setting, word
 
 #: Relaxation rate times half a clock step from which on bonds have forgotten the step before.
 _FORGOTTEN = 10.0
@@ -104,8 +104,9 @@ def _relaxation(dataset: xr.Dataset, when: xr.DataArray) -> xr.DataArray:
         rate = setting(dataset, "bonds.rebinding_rate")
         with contextlib.suppress(KeyError):
             rate = setting(dataset, "bonds.rebinding_rate_at_temperature")
-        if "bond_fraction" in dataset and MEMBERS not in dataset["bond_fraction"].dims:
+        if "bond_fraction" in dataset:
+            left = ensemble_mean(dataset["bond_fraction"])
+            left = left.mean(MEMBERS) if MEMBERS in left.dims else left
             at = when.fillna(0.0)
-            left = dataset["bond_fraction"].sel(t=at, method="nearest").drop_vars("t")
-            rate = rate / left
+            rate = rate / left.sel(t=at, method="nearest").drop_vars("t")
     return rate

@@ -53,12 +53,16 @@ class SystematicError(NamedTuple):
 
 
 def systematic_errors(dataset: xr.Dataset) -> list[SystematicError]:
-    """Return the systematic errors of area, friction and pull-off load that are not 0, as far as they are known.
+    """Return the systematic errors of recorded areas, frictions and pull-off loads that are not 0, as far as known.
 
     The cure of an error of the cell leaves about a tenth of it. It is "" if the error is less than 1 % of the JKR area.
     """
+    recorded = {"area": "contact_area", "friction": "friction_force"}
     names = [
-        f"{source}_error_{of}" for of in _UNITS for source in ("cell", "banded", "step")
+        f"{source}_error_{of}"
+        for of in _UNITS
+        for source in ("cell", "banded", "step")
+        if recorded.get(of, of) in dataset
     ]
     known = [name for name in (*names, "pull_off_error") if name in dataset]
     return [

@@ -548,7 +548,8 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
         )
         is_known, never = ends[0].notnull(), ends[0].isnull() & (level < least)
         late = xr.apply_ufunc(_read_at, ends[0], speed, off, **at_a_speed)
-        ends[1], ends[2] = ends[1] - late, ends[2] + late
+        share = (late / ends[0]).fillna(0.0)
+        ends[1], ends[2] = ends[1] * np.exp(-share), ends[2] * np.exp(share)
         ends[4] = ends[4] + late
         columns = dict(
             zip(means, others.transpose("quantity", "end", ...), strict=True)

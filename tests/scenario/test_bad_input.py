@@ -239,7 +239,7 @@ TOGETHER = [
         "[sphere]",
         'thickness = "30 nm"\n[sphere]',
         "solid.thickness",
-        "wider than 80 times...thicker",
+        "exceeds 80 times...thicker",
     ),
     (
         'longest = "60 um"',
