@@ -19,7 +19,7 @@ from sim.ensemble.expected import (
     largest_losses,
 )
 from sim.ensemble.plan import Plan
-from sim.ensemble.steady import changed, sensitivities
+from sim.ensemble.steady import bonds_at, changed, sensitivities
 from sim.ensemble.swept import grouped, in_words, places, points_in_words, spread
 from sim.laws.schallamach import Body, Onset
 from sim.parts.bonds.models import Model as BondModel
@@ -99,17 +99,30 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
             left / np.tanh(left) - 1.0, 1.0
         )
     if len(times) > 1:
-        late = point.population.delay(speeds, point.clock.step)
-        fine = np.linspace(0.0, point.times.duration, _STEPS)
-        earlier = np.interp(times - late, fine, np.abs(point.speeds(_STEPS)))
-        before = areas(scene, times, earlier, energies[: energies.size // 3])
-        gained = gained + np.mean(before, axis=-1) - cell
+        gained = gained + _late(scene, times, speeds, energies[:count]) - cell
     errors = np.stack([cell - exact, cell - banded, gained])
     worst = int(np.argmax(np.nan_to_num(np.sum(np.abs(errors), axis=0))))
     relative = errors[:, worst] / (exact[worst] or math.nan)
     values = *errors[:, worst], *relative, speeds[worst, 0], np.std(ratios[worst, 0])
     names = (row.name for row in ERRORS)
     return known | dict(zip(names, map(float, values), strict=True))
+
+
+def _late(scene: Scenario, times: Array, speeds: Array, stored: Array) -> Array:
+    """Return the mean A/A_JKR along a course of the speed with bonds that are late by the clock step, shape (times,).
+
+    The amplitude of the fluctuations is that at the speed itself.
+    """
+    law = scene.fluctuations.amplitude
+    fraction = bonds_at(scene.population, tuple(speeds[:, 0])).fraction
+    late = scene.population.delay(fraction, scene.clock.step)
+    fine = np.linspace(0.0, scene.times.duration, _STEPS)
+    earlier = np.interp(times[:, 0] - late, fine, np.abs(scene.speeds(_STEPS)))
+    strength = bonds_at(scene.population, tuple(earlier)).strength[:, np.newaxis]
+    earlier = earlier[:, np.newaxis]
+    now, before = (law.factor(each, strength) ** 2 for each in (speeds, earlier))
+    ratio = np.divide(now, before, out=np.ones(before.shape), where=before > 0.0)
+    return np.asarray(np.mean(areas(scene, times, earlier, ratio * stored), axis=-1))
 
 
 def worst(candidates: Iterable[Worst]) -> Worst | None:

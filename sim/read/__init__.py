@@ -3,7 +3,8 @@
 Everything is read from the file; only speeds in steady sliding of chosen losses are computed by the models. A ``Run``
 knows the facts of a dataset and has the statistics of each quantity. *Observables* are variables per member and time;
 some are recorded, others are derived (such as the share of the area lost to broken bonds). *Events* occur once in a
-run, such as a pull-off. The statistics of a quantity are an ``Estimate``."""
+run, such as a pull-off. The statistics of a quantity are an ``Estimate``.
+"""
 
 from sim.read.correlation import IntegralTime, correlation_time, integral_time
 from sim.read.dataset import (

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.laws.schallamach import delay_by_steps
+from sim.numerics.delay import delay_by_steps
 from sim.read.dataset import MEMBERS, ensemble_mean, setting, word
 
 #: Relaxation rate times half a clock step from which on bonds have forgotten the step before.
@@ -40,7 +40,7 @@ def of_maxima(dataset: xr.Dataset, when: xr.DataArray, change: xr.DataArray) -> 
     During a clock step dt bonds have the mean speed of the step, which is that at its
     middle, but time and speed of a sample are those at its end. Bonds without a memory
     are therefore found dt/2 late, and bonds that relax exponentially at a rate k by less
-    (``sim.laws.schallamach.delay_by_steps``). The rate k is that of rebinding over the
+    (``sim.numerics.delay.delay_by_steps``). The rate k is that of rebinding over the
     share of bonds that is left, as in a rate equation.
 
     Two errors remain. In other models k may differ by a factor, which changes the delay

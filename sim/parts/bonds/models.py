@@ -30,12 +30,12 @@ from sim.laws import schallamach
 from sim.laws.schallamach import (
     Body,
     Onset,
-    delay_by_steps,
     linear_onset,
     relaxed,
     steady_fraction,
     transition_probabilities,
 )
+from sim.numerics.delay import delay_by_steps
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, binomial, stream, success
 from sim.parts.bonds.cohorts import Cohorts
@@ -126,9 +126,20 @@ class _BondModel(Part):
     def why(self, area: float, forces: bool) -> str:
         return ""
 
-    def delay(self, speed: Array, step: float) -> Array:
-        """Return by how much a clock step delays the bonds along a course of the speed [s], at most."""
-        return np.full(speed.shape, 0.5 * step)
+    @property
+    def bound_at_rest(self) -> float:
+        """Share of sites bound at a bond fraction of 1 [1]."""
+        return 1.0
+
+    def delay(self, fraction: Array, step: float) -> Array:
+        """Return by how much a clock step delays the bonds along a course of the speed [s], at bond fractions [1].
+
+        They are taken to relax as by a rate equation, at the rate of rebinding over the share of sites that are bound.
+        """
+        bound = self.bound_at_rest * fraction
+        rate = np.full(bound.shape, math.inf)
+        np.divide(self.rebinding_rate, bound, out=rate, where=bound > 0.0)
+        return delay_by_steps(step, rate)
 
     def followed(self, speeds: Array, step: float) -> float:
         """Return the mean number of bond lives that are followed in a step of one member at speeds [m/s]."""
@@ -330,8 +341,8 @@ class _AtOnce(_WithoutStretch):
         stiffness = np.where(np.isnan(area), np.nan, stiffness)
         return Onset(stiffness, np.full(speed.shape, np.nan))
 
-    def delay(self, speed: Array, step: float) -> Array:
-        return np.zeros(speed.shape)
+    def delay(self, fraction: Array, step: float) -> Array:
+        return np.zeros(fraction.shape)
 
     def _lost(self, speed: Array) -> Array:
         """Return the share of the bound sites that is lost as the speed grows [s/m], at speeds above 0."""
@@ -401,9 +412,6 @@ class Rate(_OverArea, _WithoutStretch):
         return bonding._replace(
             stiffness=-self.rebinding_rate / self.critical_speed * bonding.strength
         )
-
-    def delay(self, speed: Array, step: float) -> Array:
-        return delay_by_steps(step, self.rebinding_rate / self._steady_fraction(speed))
 
 
 @keyed()
