@@ -64,9 +64,9 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
     There are none of area and friction without a cell. They are those of the mean over members in steady sliding. The
     energy of a member is a gamma number with an offset, of the mean, variance and skewness in the cell. The error of
     the cell is that of this mean against the infinite plane, the error of the bands that of the skewness against all
-    modes. A clock step adds at most the variance of the radius that a lagging edge gains by it, and along a course of
-    the speed what the contact changes while its bonds are late by the step. They are nan if the contact opens at some
-    of the energies at all times.
+    modes. A clock step adds at most the variance of the radius that a lagging edge gains by it, and along a prescribed
+    course of the speed what the contact changes while its bonds are late by the step. They are nan if the contact opens
+    at some of the energies at all times.
     """
     shear, plane = (
         point.fluctuations,
@@ -98,7 +98,7 @@ def systematic_errors(point: Scenario) -> dict[str, float]:
         gained = np.var(np.sqrt(ratios[:, 0]), axis=-1) * np.minimum(
             left / np.tanh(left) - 1.0, 1.0
         )
-    if len(times) > 1:
+    if len(times) > 1 and not point.drive.solves_motion:
         gained = gained + _late(scene, times, speeds, energies[:count]) - cell
     errors = np.stack([cell - exact, cell - banded, gained])
     worst = int(np.argmax(np.nan_to_num(np.sum(np.abs(errors), axis=0))))

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from sim.numerics.delay import delay_by_steps
-from sim.read.dataset import MEMBERS, ensemble_mean, setting, word
+from sim.read.dataset import MEMBERS, ensemble_mean, resolved, setting, word
 
 #: Relaxation rate times half a clock step from which on bonds have forgotten the step before.
 _FORGOTTEN = 10.0
@@ -71,23 +71,34 @@ def of_course(dataset: xr.Dataset, change: xr.DataArray) -> Delay:
     Notes
     -----
     See ``of_maxima``. Bonds that the speed sets at once have that at the end of the step:
-    no delay. If the area depends on bonds that relax exponentially and on nothing else that
-    changes, their delay is known to the second order of the change h of the speed in a step. Any
-    other memory that only fades, such as that of bonds with a stretch or of an amplitude
-    that relaxes, delays by 0 to dt/2, and what has no memory beside it not at all.
+    no delay. Behind a spring there is none either, because the motion is solved within
+    the step. If the area depends on bonds that relax exponentially and on nothing else
+    that changes, their delay is known to the second order of the change h of the speed in
+    a step. Any other memory that only fades, such as that of bonds with a stretch or of an
+    amplitude that relaxes, delays by 0 to dt/2, and what has no memory beside it not at
+    all.
     """
     step = setting(dataset, "clock.step")
     bonds = word(dataset, "bonds.model", "none")
-    remembers = ~bonds.isin(_AT_ONCE)
+    remembers, fluctuates = ~bonds.isin(_AT_ONCE), _fluctuates(dataset)
     # models of the same name whose bonds stretch have no critical speed
     decays = bonds.isin(_EXPONENTIAL) & ("bonds_critical_speed" in dataset)
-    alone = ~_fluctuates(dataset) & (word(dataset, "drive.model", "") != "spring")
+    is_late = remembers | (fluctuates & _relaxes(dataset))
+    is_late = is_late & (word(dataset, "drive.model", "") != "spring")
     half = 0.5 * step
     late = xr.apply_ufunc(delay_by_steps, step, _relaxation(dataset, dataset["t"]))
     late = late.where(remembers, 0.0)
-    exact = step * step * change
-    bound = xr.where(decays & alone, 0.0, np.maximum(late, half - late)) + exact
-    return Delay(late, bound.where(remembers | ~alone, 0.0))
+    bound = xr.where(decays & ~fluctuates, 0.0, np.maximum(late, half - late))
+    bound = bound + step * step * change
+    return Delay(late.where(is_late, 0.0), bound.where(is_late, 0.0))
+
+
+def _relaxes(dataset: xr.Dataset) -> bool:
+    """Return True if the amplitude of the fluctuations relaxes, or may do so at some points of a sweep."""
+    try:
+        return bool(resolved(dataset, "shear.amplitude").get("relaxing"))
+    except KeyError:
+        return True
 
 
 def _fluctuates(dataset: xr.Dataset) -> xr.DataArray:

@@ -259,6 +259,23 @@ def test_a_loss_along_a_ramp_is_at_the_speed_that_the_bonds_feel(part, is_exact)
     assert found >= 1
 
 
+@pytest.mark.parametrize("rate", [50.0, 5000.0])
+def test_behind_a_spring_that_moves_with_a_ramp_bonds_are_not_late(rate):
+    """The motion is solved within a clock step, so that a step of 5 % of the speed is as good as a fortieth of it."""
+    part, step = (
+        bonds.Rate(critical_speed=1e-2, rebinding_rate=rate, stress=0.3e6),
+        1e-2,
+    )
+    stage = {"from": 1e-5, "to": 0.1, "scale": "log"}
+    spring = drive.Spring(
+        stage=stage, stiffness=2e4, damping=20.0, contact_stiffness="rigid"
+    )
+    coarse, fine = (course(part, each, drive=spring) for each in (step, step / 40.0))
+    for name in ("speed_at_2_percent_lost", "speed_at_15_percent_lost"):
+        change = math.log(1e4) / 2.0 * step
+        assert_allclose(coarse[name].value, fine[name].value, rtol=change**2)
+
+
 def test_what_fluctuates_beside_bonds_along_a_ramp_leaves_its_part_of_the_delay_open():
     """A delay of the bonds between nothing and half a step is within the bound, and its cause is named."""
     field = shear.Modal(
