@@ -547,9 +547,8 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
     before_node = (
         START[0] * nodes.slip[0] + START[1] * nodes.slip[1] + START[2] * nodes.slip[2]
     ) / step
-    _, first, _, _ = mechanics.contact_area(
-        row.bound, row.moment, start, row.radius, contact
-    )
+    # a contact that has lost its equilibrium keeps its area until it opens
+    _, first, _, _ = mechanics.area_or_last(row.bound, row.moment, start, row, contact)
     firm = mechanics.stiffness_of(row.radius, slider)
     for i in range(3):
         bound, moment, time = (
