@@ -523,7 +523,7 @@ _KINDS = {
     "loop": "Load and contact radius over displacement, and radius over load, with the pull-offs and JKR's"
     " equilibria. --data",
     "theories": "Contact area, simulated and by each theory, over shear stress and tangential force.",
-    "stress": "Shear stress with its maximum, and bonds, over speed; of a start, over time. --data",
+    "stress": "Shear stress and bonds over speed, with each maximum; of a start, over time. --data",
     "stability": "Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed,"
     " with theory.",
     "creep": "Displacement and speed of the slider over time under a prescribed force. A cross marks a runaway. --data",

@@ -3,7 +3,8 @@
 from typing import cast
 
 import numpy as np
-from scipy import optimize, special
+import scipy
+from scipy import special
 
 from sim.ensemble.diagnosis import slider_body
 from sim.ensemble.steady import steady_course
@@ -60,7 +61,7 @@ def speeds_of_areas(scene: Scenario, shares: Array) -> tuple[Array, Array]:
     for place, share in np.ndenumerate(shares):
         after = int(np.argmax(curve <= share))
         if curve[0] > share >= curve[after]:
-            logarithm = optimize.brentq(
+            logarithm = scipy.optimize.brentq(
                 lambda x, level=share: float(area(np.array([x]))[0]) - level,
                 *grid[after - 1 : after + 1],
                 xtol=1e-10,

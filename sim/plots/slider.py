@@ -410,7 +410,7 @@ def needs_stress(dataset: xr.Dataset) -> None:
 def stress_figure(
     dataset: xr.Dataset, data: Measured | None = None, ax: Axes | None = None
 ) -> Figure:
-    """Shear stress with its maximum, and bonds, over speed; of a start, over time."""
+    """Shear stress and bonds over speed, with each maximum; of a start, over time."""
     if "drive_rest" in dataset:
         if data or ax:
             raise ValueError(
@@ -427,7 +427,7 @@ def _stress_panel(panel: Axes, scene: Scene) -> None:
     """Draw the shear stress upon closed forms, with the maximum of each curve."""
     words, stresses = r"shear stress $\tau_0$", scene.all("shear_stress")
     factor = style.in_unit(panel.yaxis, words, stresses, "Pa")
-    scene.statistics.stated = Run(scene.statistics.dataset).statements([])
+    scene.statistics.stated = Run(scene.statistics.dataset).events
     lines = [
         _mark_peak(panel, scene, line, factor, "speed") if line.style == "-" else line
         for line in scene.lines
@@ -484,7 +484,7 @@ def start_figure(dataset: xr.Dataset) -> Figure:
     longest = dataset.isel(
         {dim: np.flatnonzero(rests == rests.max()) for dim in rests.dims}
     )
-    rest, stated = float(rests.max()), Run(longest).statements([])
+    rest, stated = float(rests.max()), Run(longest).events
     swept = [str(dim) for dim in (*speeds.dims, *rests.dims) if dataset.sizes[dim] > 1]
     has_peaks = bool(swept) and "peak_stress" in stated
     figure, axes = style.pairs(2.9) if has_peaks else style.rows([2.15])
@@ -503,7 +503,7 @@ def start_figure(dataset: xr.Dataset) -> Figure:
     style.legend(axes[0], scene.headed(after).title)
     if has_peaks:
         scene = over_key(dataset, swept[0])
-        scene.statistics.stated = Run(scene.statistics.dataset).statements([])
+        scene.statistics.stated = Run(scene.statistics.dataset).events
         factor = statement_curves(axes[1], scene, "peak_stress")
         if scene.over.endswith("speed"):
             _laws(axes[1], scene, 0, factor)

@@ -118,7 +118,7 @@ def closed_only(dataset: xr.Dataset) -> xr.Dataset:
     They are nan if some contacts are open and at most two are closed.
     """
     names = [name for name in OF_CONTACT if name in dataset]
-    if "in_contact" not in dataset:
+    if "in_contact" not in dataset or not names:
         return dataset
     closed = dataset["in_contact"]
     if not only_statistics(dataset):
@@ -316,8 +316,10 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
     return (full - alone) / full
 
 
-def observables(dataset: xr.Dataset) -> xr.Dataset:
-    """Return every recorded trajectory, per member if members differ, and what follows from them.
+def observables(
+    dataset: xr.Dataset, names: Collection[str] | None = None
+) -> xr.Dataset:
+    """Return every recorded trajectory, per member if members differ, and those of ``names`` that follow from them.
 
     ``area_ratio`` is A/A_JKR, with the JKR area for the same mount at that time. ``fraction_detached`` is 1 if the
     contact is open. ``fraction_masked`` is 1 if it is closed without effective work of adhesion (a Hertz contact).
@@ -328,20 +330,25 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     result = dataset.drop_vars(
         [n for n, v in dataset.data_vars.items() if "t" not in v.dims]
     )
-    if "contact_area" in result and {*_REFERENCES} <= {*result}:
+
+    def is_wanted(name: str, *sources: str) -> bool:
+        return (names is None or name in names) and {*sources} <= {*result}
+
+    if is_wanted("area_ratio", "contact_area", *_REFERENCES):
         area = result["contact_area"].astype(float, copy=False)
         result["area_ratio"] = defined("area_ratio", area / full_area(dataset))
     moves = ensemble_mean(dataset.get("slider_position", xr.DataArray(0.0))).notnull()
-    if "in_contact" in result:
+    if is_wanted("fraction_detached", "in_contact"):
         closed = result["in_contact"].astype(float, copy=False)
         opened = with_mean(closed, 1.0 - ensemble_mean(closed))
         opened = opened.where(moves | (ensemble_mean(closed) == 0.0))
         result["fraction_detached"] = defined("fraction_detached", opened)
-    with where_recorded():
+    if is_wanted("fraction_masked", "masked"):
         masked = dataset["masked"].astype(float, copy=False)
-        if STATISTIC in masked.dims:  # only of closed contacts it is known
-            masked = masked.where(ensemble_mean(dataset["in_contact"]) == 1.0)
-        result["fraction_masked"] = defined("fraction_masked", masked.where(moves))
+        with where_recorded():
+            if STATISTIC in masked.dims:  # only of closed contacts it is known
+                masked = masked.where(ensemble_mean(dataset["in_contact"]) == 1.0)
+            result["fraction_masked"] = defined("fraction_masked", masked.where(moves))
     return result.drop_vars(["in_contact", "masked"], errors="ignore")
 
 
@@ -399,7 +406,7 @@ def chosen_observables(
 
     If it is None, return all observables, and the shares of the lost area in both orders if they are known.
     """
-    result = observables(dataset)
+    result = observables(dataset, names)
     if names is None or _shares_among(names):
         result = result.merge(charges(dataset), compat="no_conflicts")
     if names is None:

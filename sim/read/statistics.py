@@ -248,14 +248,14 @@ def _at_known_mean(
     ]
     result = corrected(*rows)
     is_used = control.is_used.broadcast_like(plain.value).transpose(*plain.value.dims)
-    is_used = is_used & np.isfinite(result.sem)
+    at_known_mean = is_used.to_numpy() & np.isfinite(result.sem)
     low, high = interval("", result.mean, result.sem, result.freedom + 1.0)
 
     def where_used(array: Array, other: Any) -> xr.DataArray:
-        return xr.where(is_used, plain.value.copy(data=array), other, keep_attrs=True)
+        return plain.value.copy(data=np.where(at_known_mean, array, other))
 
     return plain._replace(
-        value=where_used(result.mean, plain.value).assign_attrs(plain.value.attrs),
+        value=where_used(result.mean, plain.value),
         sem=where_used(result.sem, plain.sem),
         low=where_used(low, plain.low),
         high=where_used(high, plain.high),

@@ -28,7 +28,7 @@ from sim.read.errors import remarks
 from sim.read.estimate import Estimate
 from sim.read.run import Run
 from sim.read.statistics import over_members
-from sim.read.tables import figure, key_figures, notes, tables_of
+from sim.read.tables import figure, key_figures, notes, table, tables_of
 from sim.reports.methods import errors, is_estimated, methods, rendered
 from sim.scenario.files import question_of, toml
 from sim.units.errors import naming
@@ -38,7 +38,7 @@ from sim.units.notation import engineering
 Data = Path | str | Mapping[str, Any]
 
 #: Kinds that are drawn wherever they can be, beside those that fit.
-_ALSO = ("stress", "incipient", "map")
+_ALSO = ("incipient", "map")
 #: Kinds that show nothing more beside the one that fits best.
 _REPEATED = {
     "theories": ("sweep",),
@@ -84,8 +84,10 @@ def drawings(run: Run, data: Data | None = None) -> list[Drawing]:
     # nothing happens in time where a run lasts, and its end says little where it does not
     repeated = {*_REPEATED.get(best, ()), "time" if run.is_stationary else "sweep"}
     shown = [best, kinds.default(dataset)]
+    peak = run.events.get("peak_stress")
+    also = _ALSO if peak is None or bool(peak.is_missing.all()) else ("stress", *_ALSO)
     for kind in kinds.drawable(dataset):
-        fits = kind in _ALSO or kinds.KINDS[kind].fits(dataset)
+        fits = kind in also or kinds.KINDS[kind].fits(dataset)
         if fits and kind not in repeated:
             shown.append(kind)
     result = []
@@ -240,7 +242,7 @@ def html(
         answer=answer(run),
         drawings=figures,
         key_figures=key,
-        main=tables_of(run, _ROWS)[0],
+        main=table(run, _ROWS),
         tables=shown,
         remarks=remarks(dataset),
         notes=notes(run, shown),

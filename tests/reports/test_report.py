@@ -218,6 +218,16 @@ def test_the_first_figure_fits_a_run_best_and_others_show_more_of_it():
 
 
 @pytest.mark.usefixtures("unwritten")
+def test_the_stress_over_the_speed_is_a_further_figure_only_if_it_has_a_maximum():
+    # the stress of exponential bonds saturates, that of bonds with a rupture law falls again
+    for scene, has_peak in (("pdms_lens", False), ("friction_maximum", True)):
+        read_run = read.Run(shipped(scene, ensemble={"members": 2}, sweep={}))
+        has_value = not bool(read_run.events["peak_stress"].is_missing.all())
+        shown = [each.kind for each in report.drawings(read_run)]
+        assert ("stress" in shown, has_value) == (has_peak, has_peak)
+
+
+@pytest.mark.usefixtures("unwritten")
 def test_no_words_of_a_library_reach_a_page(monkeypatch, smooth):
     def refuse(dataset, kind, *choices):
         if kind == best:
