@@ -367,7 +367,10 @@ def _ahead(row, nodes, step, law):
 def newton(row, start, step, slider, law, contact, nodes):
     """Solve for slip, u, N, M at the nodes, by Newton's method with the slopes at the middle node. True if solved.
 
-    It ends where the next correction would be small, at the pace of the last two.
+    It ends where the next correction would be small, at the pace of the last two, and
+    where the equations are linear within the last one: their remainder is its square. An
+    unknown that starts at zero makes the first correction so large that the pace alone
+    says nothing.
     """
     _ahead(row, nodes, step, law)
     for i in range(3):
@@ -406,7 +409,8 @@ def newton(row, start, step, slider, law, contact, nodes):
             for k in range(4):
                 nodes.values[k, i] -= part * nodes.residuals[k, i]
         shrinks = change / before if turn > 0 else 0.5
-        if change * min(1.0, shrinks / max(1.0 - shrinks, 1e-3)) <= close:
+        pace = min(1.0, shrinks / max(1.0 - shrinks, 1e-3))
+        if change * max(pace, change) <= close:
             return True
         if not (part > 0.0 and change < 1e12) or (turn > 2 and shrinks > 1.0):
             return False
