@@ -432,7 +432,7 @@ def test_the_fits_of_the_measured_loop_print_the_numbers_of_the_page(
     if not (path := os.environ.get("SIM_MEASURED_LOOP")):
         pytest.skip("SIM_MEASURED_LOOP names the file, which has no licence to be here")
     shutil.copy(path, tmp_path / "test-5")
-    shutil.copy(ROOT / "docs" / "measured_loop.toml", tmp_path)
+    shutil.copy(ROOT / "docs" / "pdms_loop.toml", tmp_path)
     monkeypatch.chdir(tmp_path)
     page, output = "docs/validation.md", ""
     for words, code in blocks(page):

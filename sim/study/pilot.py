@@ -148,10 +148,15 @@ class Pilots:
     """
 
     def __init__(
-        self, members: int, names: Iterable[str], default: Names, *work: float
+        self,
+        members: int,
+        names: Iterable[str],
+        default: Names,
+        budget: float,
+        spent: float = 0.0,
     ) -> None:
         self.members, self.names, self.default = members, [*names], default
-        self.budget, self.spent = work
+        self.budget, self.spent = budget, spent
         self._samples = dict[str, Sample | None]()
         self._substeps = dict[str, float]()
 
