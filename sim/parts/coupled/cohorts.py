@@ -468,13 +468,14 @@ def _lacking(shift, pool, count, row, time, slider, contact, law):
 
 
 @device
-def _slip_event(row, pool, count, time, slider, contact, law, books):
+def _slip_event(row, pool, count, place, slider, contact, law, books):
     """Slip at once to where bonds bear the pull, if an avalanche has begun; return the bonds left, else less than 0.
 
-    ``books``: the node there, and the energies. The first such place is looked for in steps of at most half the width
-    to which stretches are resolved.
+    ``place``: time, and the slip within which the force begins to fall. ``books``: the node there, and the energies.
+    The first place where bonds bear the pull is looked for in steps of at most half the width to which stretches are
+    resolved.
     """
-    (unit, rules), (node, energy) = law, books
+    (time, ahead), (unit, rules), (node, energy) = place, law, books
     is_held, step, limit = (
         slider.mass + slider.damping > 0.0,
         0.5 * rules.cell / unit,
@@ -483,7 +484,7 @@ def _slip_event(row, pool, count, time, slider, contact, law, books):
     sense = math.copysign(1.0, row.moment if is_held else row.spring_force)
     here, area, _, _, _ = _lacking(0.0, pool, count, row, time, slider, contact, law)
     near, _, _, _, _ = _lacking(
-        sense * _TRIED * limit, pool, count, row, time, slider, contact, law
+        sense * ahead, pool, count, row, time, slider, contact, law
     )
     # merged stretches reach a little beyond the limit
     if not (
@@ -627,7 +628,16 @@ def _piece(line, bonds, slider, contact, law, room, books):
             slid, row.next_step = row.slip, 0.0
             place = start, mechanics.BRIEF * length
             at_here = nodes[0], energy
-            if _break_all(row, pool, place, slider, contact, law, at_here):
+            # the speed grows beyond all bounds before the force falls by a stretch that is resolved
+            new_count, ahead = -1, (start, 0.5 * rules.cell / unit)
+            if rules.limit < math.inf and brittle:
+                new_count = _slip_event(
+                    row, pool, count, ahead, slider, contact, law, at_here
+                )
+            if new_count >= 0:
+                count, row.next_step = new_count, 1e-6 * length
+                travelled += unit * (row.slip - slid)
+            elif _break_all(row, pool, place, slider, contact, law, at_here):
                 count = settled = 1
                 travelled += unit * (row.slip - slid)
             elif rules.limit == math.inf and mechanics.snap(
@@ -679,8 +689,12 @@ def _piece(line, bonds, slider, contact, law, room, books):
                 )
                 new_count = -1
                 if brittle:
+                    place, at_here = (
+                        (start, _TRIED * rules.limit / unit),
+                        (first, energy),
+                    )
                     new_count = _slip_event(
-                        row, pool, count, start, slider, contact, law, (first, energy)
+                        row, pool, count, place, slider, contact, law, at_here
                     )
                 if new_count < 0 and (is_held or slider.viscosity > 0.0):
                     place, at_here = (start, reach), (first, energy)
