@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from sim.ensemble.diagnosis import onset, stability
 from sim.explorer.drawing import listed
 from sim.parts.exchange import Array
 from sim.quantities import QUANTITIES
@@ -194,7 +195,8 @@ class StabilityMap:
     """Swing of the spring force over speed and stiffness, one row of the map after the other.
 
     The scenario sweeps the stiffness of the spring alone, and its stage moves at changing speed. The swing is the range
-    of the force in a cell over its largest. It has a panel for increasing and one for decreasing speed.
+    of the force in a cell over its largest. It has a panel for increasing and one for decreasing speed, each with the
+    stiffness below which steady sliding is unstable in linear theory, and a colour scale.
     """
 
     def __init__(self, stiffness: Sequence[float]) -> None:
@@ -203,21 +205,24 @@ class StabilityMap:
         self._of: dict[str, float] = {}
 
     def answer(self, scene: Scenario, values: dict[str, float]) -> dict[str, Any]:
-        """Return the map with one further row for the numbers of a scene; ``more`` is True until it has all rows."""
+        """Return the map with one further row for the numbers of a scene; ``more`` is True until it has all rows.
+
+        ``plays`` has the numbers and the moment of each cell, in words, too, and ``table`` the swings of all cells.
+        """
         others = {key: x for key, x in values.items() if key != _STIFFNESS}
         if others != self._of:
             self._of, self._rows = others, {}
         missing = [one for one in self.stiffness if one not in self._rows]
         if missing:
             self._rows[missing[0]] = _legs(scene.with_values({_STIFFNESS: missing[0]}))
-        return self._drawn(len(missing) > 1)
+        return self._drawn(scene, len(missing) > 1)
 
-    def _drawn(self, more: bool) -> dict[str, Any]:
+    def _drawn(self, scene: Scenario, more: bool) -> dict[str, Any]:
         hard = np.array(self.stiffness)
         per_y, unit_y = scaled(float(np.sqrt(hard[0] * hard[-1])), "N/m")
         middle = np.sqrt(hard[1:] * hard[:-1])
         sides = [hard[0] ** 2 / middle[0], *middle, hard[-1] ** 2 / middle[-1]]
-        panels, plays, slipping = dict[str, Any](), dict[str, Any](), set[float]()
+        panels, plays, table = dict[str, Any](), dict[str, Any](), dict[str, Any]()
         for place, stiffness in enumerate(self.stiffness):
             for leg in self._rows.get(stiffness, []):
                 per_x, unit_x = scaled(leg.edges[-1], "m/s")
@@ -227,27 +232,81 @@ class StabilityMap:
                 panel = {"x": across, "y": upper, "height": 230, "marks": []}
                 panel = panels.setdefault(leg.words, panel)
                 low, high = per_y * sides[place], per_y * sides[place + 1]
+                of_spring = f"K = {engineering(stiffness, 'N/m')}, {leg.words}"
+                centres = per_x * np.sqrt(leg.edges[1:] * leg.edges[:-1])
+                table[across["label"]] = listed(centres)
+                table[f"{of_spring} (%)"] = listed(100.0 * leg.swings)
                 for cell in np.flatnonzero(np.isfinite(leg.swings)).tolist():
                     swing, name = float(leg.swings[cell]), f"{leg.words} {place} {cell}"
-                    opacity = max(0.02, 0.9 * swing)
-                    look = {"name": name, "high": [high, high], "opacity": opacity}
+                    look = {"name": name, "high": [high, high], **_shade(swing)}
                     x, y = per_x * leg.edges[[cell, cell + 1]], np.array([low, low])
                     panel["marks"].append(_mark("band", x, y, "fluctuations", **look))
-                    time = float(leg.times[cell])
-                    plays[name] = {"values": {_STIFFNESS: stiffness}, "time": time}
-                    if swing > _SLIPS:
-                        slipping.add(stiffness)
-        words = "No spring shown sticks and slips"
-        if slipping:
-            hardest = engineering(max(slipping), "N/m")
-            words = f"Sticks and slips with springs up to {hardest}; the swing of the force is the larger the darker"
-        words += "; more rows follow" if more else ". Click a cell to play it"
-        shown = [*panels.values()]
-        return {"panels": shown, "words": words, "more": more, "plays": plays}
+                    at = engineering(centres[cell] / per_x, "m/s")
+                    plays[name] = {
+                        "values": {_STIFFNESS: stiffness},
+                        "time": float(leg.times[cell]),
+                        "words": f"{of_spring}, about {at}: {100.0 * swing:.2g} %",
+                    }
+        for panel in panels.values():
+            ends = self._rows[self.stiffness[0]][0].edges[[0, -1]]
+            fine = np.geomspace(*ends, _FINE)
+            needed = per_y * onset(scene, fine).stiffness
+            inside = (needed >= per_y * sides[0]) & (needed <= per_y * sides[-1])
+            y = np.where(inside, needed, np.nan)
+            look = {"label": "theory", "name": "theory", "width": 2}
+            panel["marks"].append(_mark("line", per_x * fine, y, "bonds", **look))
+        shown = [*panels.values(), _scale()]
+        columns = {"head": [*table], "rows": [*zip(*table.values(), strict=True)]}
+        words = self._words(scene) + ("; more rows follow" if more else "")
+        answer = {"panels": shown, "words": words, "more": more, "plays": plays}
+        return answer | {"table": columns}
+
+    def _words(self, scene: Scenario) -> str:
+        """Return between which springs of the map the force begins to vary, and the limit of stability in theory."""
+        most = {
+            stiffness: max(float(np.nanmax(leg.swings)) for leg in legs)
+            for stiffness, legs in sorted(self._rows.items())
+        }
+        varying = [stiffness for stiffness, swing in most.items() if swing > _HALF]
+        words = f"The spring force varies by at most {100.0 * max(most.values()):.2g} % within a cell"
+        if varying:
+            words = f"The spring force varies by more than half within a cell at K = {engineering(varying[-1], 'N/m')}"
+            stiffer = [stiffness for stiffness in most if stiffness > varying[-1]]
+            if stiffer:
+                words += f", and by less from {engineering(stiffer[0], 'N/m')} on"
+        theory = stability(scene)
+        if 0.0 < theory.stiffness < np.inf:
+            limit, speed = (
+                engineering(theory.stiffness, "N/m"),
+                engineering(theory.speed, "m/s"),
+            )
+            words += (
+                f". In theory (line) steady sliding is unstable below {limit} at {speed}; near the line oscillations"
+                " may grow too slowly for this ramp, which starts in steady sliding"
+            )
+        return words
 
 
-#: Key of the map, and swing of the force from which a cell sticks and slips.
-_STIFFNESS, _SLIPS = "drive.stiffness", 0.5
+#: Key of the map; range of the force in a cell over its largest that the sentence is about; speeds of the theory.
+_STIFFNESS, _HALF, _FINE = "drive.stiffness", 0.5, 200
+#: Steps of the colour scale.
+_SHADES = 20
+
+
+def _shade(swing: float) -> dict[str, float]:
+    """Return how opaque a cell is in which the force varies by a share of its largest."""
+    return {"opacity": max(0.02, 0.9 * swing)}
+
+
+def _scale() -> dict[str, Any]:
+    """Return the colour scale of the map as a panel."""
+    steps = np.linspace(0.0, 1.0, _SHADES + 1)
+    marks = []
+    for ends in np.stack([steps[:-1], steps[1:]], axis=1):
+        look = {"high": [1.0, 1.0], **_shade(float(np.mean(ends)))}
+        marks.append(_mark("band", 100.0 * ends, 0.0 * ends, "fluctuations", **look))
+    across = axis("range of the spring force in a cell", "% of its largest", tight=True)
+    return {"x": across, "y": axis("", "", tight=True), "height": 12, "marks": marks}
 
 
 class _Leg(NamedTuple):

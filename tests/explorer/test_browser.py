@@ -739,6 +739,8 @@ def test_a_click_on_the_map_of_stability_plays_that_point(browser):
         assert page.evaluate("explored.values['drive.stiffness']") == softest
         # the stage has the speed of the cell after 20 of 24 equal factors within 4 s
         time = page.evaluate("explored.motion.time")
+        moment = page.locator("#moment")
+        wait(page, lambda: "map has set" in moment.text_content(), "no word")
         assert 4.0 * 20.0 / 24.0 - 0.01 < time < 4.0 * 21.0 / 24.0
         page.locator("#undo").click()
         assert page.evaluate("explored.values['drive.stiffness']") == 100.0

@@ -13,6 +13,7 @@ from helpers.commands import LENS as MOUNTED, sim as command
 from numpy.testing import assert_allclose
 
 import sim
+from sim.ensemble.diagnosis import slider_body
 from sim.explorer import take
 from sim.explorer.drawing import contact
 from sim.explorer.figures import rings
@@ -477,10 +478,22 @@ def test_the_map_of_stability_has_the_swings_of_runs_and_plays_their_moments():
     page = Page(scene)
     assert page.figure({}, "map")["more"]
     answer = page.figure({}, "map")
-    assert not answer["more"] and "up to 50 N/m" in answer["words"]
+    assert not answer["more"]
+    # between which two springs the motion changes, and the boundary of sim check
+    for word in ("at K = 50 N/m", "from 1.6 kN/m on", "below 1.128 kN/m at 10 mm/s"):
+        assert word in answer["words"]
     run = sim.run(scene)
-    grows = answer["panels"][0]["marks"]
-    assert len(answer["panels"]) == 2 and len(grows) == 48
+    *legs, scale = answer["panels"]
+    *grows, theory = legs[0]["marks"]
+    assert len(legs) == 2 and len(grows) == 48
+    drawn = np.array([theory["x"], theory["y"]], float)
+    speeds, limit = drawn[:, np.isfinite(drawn[1])]
+    body = slider_body(scene, 1e-3 * speeds)
+    needed = scene.population.onset(1e-3 * speeds, body).stiffness
+    assert_allclose(limit, needed, rtol=1e-9)
+    shades = [mark["opacity"] for mark in scale["marks"]]
+    assert shades == sorted(shades)
+    rows = np.array(answer["table"]["rows"], float)
     for mark in grows:
         play = answer["plays"][mark["name"]]
         at = run.sel(drive_stiffness=play["values"]["drive.stiffness"])
@@ -490,6 +503,11 @@ def test_the_map_of_stability_has_the_swings_of_runs_and_plays_their_moments():
         force = here["spring_force"].to_numpy()
         swing = 1.0 - force.min() / force.max()
         assert_allclose(mark["opacity"], max(0.02, 0.9 * swing), atol=0.02)
+        # the table has the cell's swing, in the row of its speed
+        (row,) = rows[(rows[:, 0] > mark["x"][0]) & (rows[:, 0] < mark["x"][1])]
+        of_spring = play["words"].partition(",")[0] + ", V grows (%)"
+        shown = row[answer["table"]["head"].index(of_spring)]
+        assert_allclose(max(0.02, 0.009 * shown), mark["opacity"], rtol=1e-12)
         assert (
             low * 0.999 <= float(at["stage_speed"].sel(t=play["time"])) <= high * 1.001
         )
@@ -500,6 +518,19 @@ def test_the_map_of_stability_has_the_swings_of_runs_and_plays_their_moments():
         max(mark["opacity"] for mark in hard) < 0.45 < max(m["opacity"] for m in grows)
     )
     assert Page(sim.load("scenarios/stick_slip.toml")).figures[0] == "motion"
+
+
+def test_the_map_names_no_limit_of_stability_where_each_spring_holds():
+    slow = {"from": "1 um/s", "to": "10 um/s", "scale": "log", "cycles": 1}
+    changes = {
+        "drive.stage": slow,
+        "sweep": {"drive.stiffness": ["50 N/m", "1600 N/m"]},
+    }
+    page = Page(sim.load("scenarios/stability_map.toml", changes))
+    while (answer := page.figure({}, "map"))["more"]:
+        pass
+    assert "unstable" not in answer["words"] and "half" not in answer["words"]
+    assert not any(y for panel in answer["panels"] for y in panel["marks"][-1]["y"][2:])
 
 
 def test_motions_at_other_points_of_the_sweep_keep_the_extremes_of_their_runs():

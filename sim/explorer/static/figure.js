@@ -7,7 +7,7 @@
 /** What a panel shows: `line`, `band` (between `y` and `high`), `points` (with errors), `rule` (at the places `x`), and
  * `image` (of the address `name` between the ends `x` and `y`).
  * @typedef {{ kind: "line" | "band" | "points" | "rule" | "image", x: Numbers, y: Numbers, high?: Numbers, colour: string,
- *   width?: number, size?: number, dash?: string, opacity?: number, label?: string, name?: string }} Mark */
+ *   width?: number, size?: number, dash?: string, opacity?: number, label?: string, name?: string, title?: string }} Mark */
 /** @typedef {{ x: Axis, y: Axis, height: number, marks: Mark[] }} Panel */
 /** @typedef {{ ink: string, soft: string, grid: string, back: string }} Theme */
 
@@ -176,6 +176,7 @@ function shapes(mark, right, up, ends) {
   const { x, y, colour, width = 2, dash = "", opacity = 1 } = mark;
   /** @type {Record<string, string>} */
   const about = mark.name ? { "data-name": mark.name } : {};
+  const said = mark.title ? [h("title", {}, mark.title)] : [];
   if (mark.kind === "image") {
     const [left, end] = known(x).map(right);
     const [bottom, top] = known(y).map(up);
@@ -208,13 +209,17 @@ function shapes(mark, right, up, ends) {
   if (mark.kind === "band") {
     const [low, high] = [strokes(x, y, right, up), strokes(x, mark.high ?? y, right, up)];
     return low.map((points, k) =>
-      h("path", {
-        ...about,
-        d: `M${joined(points)}L${joined([...(high[k] ?? points)].reverse())}Z`,
-        fill: colour,
-        "fill-opacity": opacity,
-        stroke: "none",
-      }),
+      h(
+        "path",
+        {
+          ...about,
+          d: `M${joined(points)}L${joined([...(high[k] ?? points)].reverse())}Z`,
+          fill: colour,
+          "fill-opacity": opacity,
+          stroke: "none",
+        },
+        ...said,
+      ),
     );
   }
   if (mark.kind === "line") {
@@ -351,7 +356,9 @@ function panelOf({ x, y, height, marks }, { ends, top, theme, number, hasLabels 
   const [left, right] = ends;
   const bottom = top + height;
   const [across, along] = [placed(x, left, right), placed(y, bottom, top)];
-  const [columns, rows] = [ticks(x, Math.max(2, (right - left) / 90)), ticks(y, Math.max(2, height / 36))];
+  // an axis without a label is none
+  const rows = y.label ? ticks(y, Math.max(2, height / 36)) : { large: [], small: [] };
+  const columns = ticks(x, Math.max(2, (right - left) / 90));
   const grid = [
     ...columns.large.map((value) => `M${across(value).toFixed(1)} ${top}V${bottom}`),
     ...rows.large.map((value) => `M${left} ${along(value).toFixed(1)}H${right}`),

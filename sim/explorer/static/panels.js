@@ -54,12 +54,13 @@ export function describedOf(state) {
  * @param {Theme} theme
  * @returns {Panel[]} */
 function ofServer(state, theme) {
-  const found = describedOf(state)?.answer.panels ?? [];
+  const { panels: found = [], plays } = describedOf(state)?.answer ?? {};
   const more = isFitted(state) ? (state.fit?.answer.marks ?? []) : [];
   return found.map((/** @type {any} */ { of, x, y, height, marks }) => {
     const own = more.filter((/** @type {any} */ mark) => of && mark.of === of);
     const drawn = [...own, ...marks].map((/** @type {any} */ mark) => ({
       ...mark,
+      title: plays?.[mark.name]?.words,
       label: greek(mark.label ?? ""),
       colour: /** @type {any} */ (COLOURS)[mark.colour] ?? theme.ink,
     }));

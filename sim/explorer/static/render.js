@@ -380,15 +380,18 @@ function plot(state, { isDark, isNarrow }) {
     $("plot").replaceChildren();
     return;
   }
-  const table = tableOf(shown);
+  /** @type {ReturnType<typeof tableOf>} */
+  const table = describedOf(state)?.answer.table ?? tableOf(shown);
   $("reader").hidden = !table.rows.length;
   const mark = readAt(state, shown, table);
   drawn.width = Math.max(300, $("plot").clientWidth);
-  drawn.shared = isMotion ? !motion.columns.normal_load : view.figure !== "data";
+  drawn.shared = isMotion ? !motion.columns.normal_load : !["data", "map"].includes(view.figure);
   const name = `${state.start.title}: ${NAMES[view.figure]}`;
   const description = $("lost").textContent;
   const about = { width: drawn.width, theme: look, title: name, description, shared: drawn.shared };
-  drawn.node = figure(mark ? shown.map((panel) => ({ ...panel, marks: [...panel.marks, mark] })) : shown, about);
+  const isRead = (/** @type {import("./figure.js").Panel} */ { x }) => mark && x.label === shown[0].x.label;
+  const read = shown.map((panel) => (isRead(panel) ? { ...panel, marks: [...panel.marks, mark] } : panel));
+  drawn.node = figure(/** @type {import("./figure.js").Panel[]} */ (read), about);
   $("plot").replaceChildren(built(drawn.node));
   // a figure that is higher than a small screen would hide what is below it if it stayed in sight
   $("plot").classList.toggle("tall", Number(drawn.node.attributes.height) > 330);

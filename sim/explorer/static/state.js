@@ -348,13 +348,14 @@ export function played(state, seconds) {
   return { ...state, motion: { ...motion, time } };
 }
 
-/** Return the state in which the motion of other numbers begins at a time.
+/** Return the state in which the motion of other numbers begins at a time, with a note on where they come from.
  * @param {State} state
- * @param {{ values: Values, time: number }} point */
-export function begun(state, { values, time }) {
+ * @param {{ values: Values, time: number, words: string }} point */
+export function begun(state, { values, time, words }) {
   const next = viewed(moved(state, values), { figure: "motion" });
   const { rate } = state.motion;
-  return { ...next, past: next.past.slice(0, -1), motion: { ...still(state.start), rate, time } };
+  const note = `The map has set ${words}. Undo returns to it.`;
+  return { ...next, past: next.past.slice(0, -1), motion: { ...still(state.start), rate, time, note } };
 }
 
 /** Return the state with a change of the motion, such as a pause.

@@ -100,6 +100,15 @@ test("a point that a logarithmic axis cannot show is not drawn", () => {
   assert.ok(!text.includes("Infinity") && !text.includes("NaN"));
 });
 
+test("an axis without a label has no numbers, and a band may have a title", () => {
+  const axis = { label: "x", low: 0, high: 1, log: false };
+  const mark = { kind: "band", x: [0, 1], y: [0, 0], high: [1, 1], colour: "#000", title: "a cell" };
+  const about = { width: 400, theme: THEME, title: "", description: "" };
+  const text = (label) => written(figure([{ x: axis, y: { ...axis, label }, height: 100, marks: [mark] }], about));
+  assert.ok(text("y").includes('text-anchor="end"') && !text("").includes('text-anchor="end"'));
+  assert.ok(text("").includes("<title>a cell</title>"));
+});
+
 test("a motion is read between its records, and its ratio to real time has words", () => {
   const motion = { columns: { t: [0, 1, 2], a: [0, 10, null] }, time: 0.25 };
   assert.equal(at(motion, "a"), 2.5);
