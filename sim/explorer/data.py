@@ -1,5 +1,6 @@
 """Measured curves on the page: their table, points beside the curves, and chi^2."""
 
+import contextlib
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sim.explorer.drawing import listed
+from sim.explorer.figures import fitness
 from sim.scenario.scenario import Scenario
 from sim.study.likelihood import Measured, by_steady_sliding, problem_of, read
 from sim.units.errors import BadInput
@@ -15,8 +17,12 @@ from sim.units.errors import BadInput
 _MOST_BYTES, _MOST_ROWS = 2_000_000, 5_000
 
 
-def table_of(source: str | Path, name: str, scenario: Scenario) -> Measured:
-    """Read a table of measured curves, its text or a file, as ``sim fit`` does.
+def table_of(
+    source: str | Path, name: str, scenario: Scenario, is_plan: bool = False
+) -> Measured:
+    """Read a table of measured curves, its text or a file, as ``sim fit`` does, or as ``sim fit --plan`` does.
+
+    A plan needs errors alone, and relative ones are those of the values that it predicts.
 
     Raises
     ------
@@ -32,7 +38,7 @@ def table_of(source: str | Path, name: str, scenario: Scenario) -> Measured:
                 [f"{name}: has more than 2 MB; leave out rows, or use sim fit"]
             )
         try:
-            table = read(path, scenario)
+            table = read(path, scenario, ["contact_area"] if is_plan else ())
         except BadInput as fault:
             raise BadInput(
                 [problem.replace(str(path), name) for problem in fault.problems]
@@ -44,8 +50,16 @@ def table_of(source: str | Path, name: str, scenario: Scenario) -> Measured:
     return table._replace(path=Path(name))
 
 
+def is_plan(source: str | Path, name: str, scenario: Scenario) -> bool:
+    """Return True if a table has errors that a plan can read, with or without measured values."""
+    with contextlib.suppress(BadInput):
+        table = table_of(source, name, scenario, is_plan=True)
+        return any(curve.errors is not None for curve in table.curves)
+    return False
+
+
 def compared(scenario: Scenario, table: Measured) -> dict[str, Any]:
-    """Return the points of a table with errors and residuals, chi^2 and how many numbers it is of.
+    """Return the points of a table with errors and residuals, chi^2, how many numbers it is of, and both in words.
 
     Points are in SI, those of the area also as shares of JKR's area. Residuals are in standard errors. A curve without
     errors has no residuals and no part in chi^2.
@@ -82,5 +96,5 @@ def compared(scenario: Scenario, table: Measured) -> dict[str, Any]:
         "chi_square": chi_square,
         "count": count,
         "name": table.path.name,
-        "remark": table.remark,
+        "words": "; ".join(filter(None, [fitness(problem), table.remark])),
     }

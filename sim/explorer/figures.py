@@ -46,10 +46,11 @@ def measured(scenario: Scenario, table: "Measured") -> dict[str, Any]:
     from sim.study.likelihood import problem_of
 
     problem = problem_of(scenario, [table], [], {})
-    return {"panels": _panels(problem, problem.start), "words": _fitness(problem)}
+    return {"panels": _panels(problem, problem.start), "words": fitness(problem)}
 
 
-def _fitness(problem: "Problem") -> str:
+def fitness(problem: "Problem") -> str:
+    """Return chi^2 of the measured numbers and the largest residual in words."""
     off = problem.residuals(problem.start)[: len(problem.values)]
     residuals = np.where(problem.estimated, np.nan, off)
     count = int(np.isfinite(residuals).sum())
@@ -249,7 +250,7 @@ class StabilityMap:
                     }
         for panel in panels.values():
             ends = self._rows[self.stiffness[0]][0].edges[[0, -1]]
-            fine = np.geomspace(*ends, _FINE)
+            fine = np.geomspace(ends[0], ends[1], _FINE)
             needed = per_y * onset(scene, fine).stiffness
             inside = (needed >= per_y * sides[0]) & (needed <= per_y * sides[-1])
             y = np.where(inside, needed, np.nan)

@@ -87,7 +87,9 @@ def planned(
 
     result = plan(scenario, table, free, sims=_SIMS, progress=_clock(say))
     further = [point.conditions for point in result.best]
-    marks = rings(problem_of(scenario, [table], [], {}), further)
+    is_measured = all(np.isfinite(curve.values).all() for curve in table.curves)
+    problem = problem_of(scenario, [table], [], {})
+    marks = rings(problem, further) if is_measured else []
     return {"numbers": {}, "text": repr(result), "remarks": [], "marks": marks}
 
 

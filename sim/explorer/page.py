@@ -117,7 +117,7 @@ class Page:
 
     def __init__(self, scenario: Scenario, data: Path | None = None) -> None:
         self._asked, self.tables = scenario, dict[str | None, "Measured"]()
-        self._sources = dict[str, tuple[str | Path, str]]()
+        self.sources = dict[str, tuple[str | Path, str]]()
         self.stamp = stamp_of(Path(scenario.source.path))
         self.scenario = scenario.with_values({})
         self.speeds = _speeds(self.scenario)
@@ -135,7 +135,8 @@ class Page:
         if source and (path := Path(source).with_suffix(".csv")).is_file():
             # a file of a course, a map or a spectrum has no measured curve
             with contextlib.suppress(BadInput):
-                return self.add(path, path.name)
+                key = self.add(path, path.name)
+                return key if key in self.tables else None
         return None
 
     @property
@@ -152,7 +153,7 @@ class Page:
             result = ["sweep"]
         else:
             result = ["spread"] if self._spreads else []
-        first = ["data"] if self._first else []
+        first = ["data"] if self._first in self.tables else []
         return [*first, *result, "speed", *([] if first else ["data"])]
 
     @property
@@ -174,7 +175,7 @@ class Page:
             scenes = [scene, *(scene.with_values(change) for change in changes)]
             names = [_words_of(scene, change) for change in changes]
             return figures.spread(scenes, ["present numbers" if names else "", *names])
-        return {"panels": [], "words": "There is no table of measured curves"}
+        return {"panels": [], "words": "There are no measured values"}
 
     def _numbers(self, scene: Scenario) -> dict[str, float]:
         known = quantities(scene)
@@ -280,10 +281,16 @@ class Page:
                 "words": _loss(scene, share, crossings, (x, columns, swept)),
             },
         }
-        if measured and not swept:
+        if measured:
             from sim.explorer.data import compared
 
             result["data"] = compared(scene, measured)
+            if swept:  # the points are over the speed
+                result["data"]["points"] = {}
+        elif table in self.sources:
+            name = Path(self.sources[table][1]).name
+            words = "errors without measured values, for a plan of where to measure"
+            result["data"] = {"points": {}, "name": name, "words": words}
         return result
 
     def _places(self, swept: str | None, measured: "Measured | None") -> Array:
@@ -409,15 +416,29 @@ class Page:
         return [scene]
 
     def add(self, source: str | Path, name: str, key: str = "") -> str:
-        """Read a table of measured curves, its text or a file, and return the name by which an ``answer`` shows it."""
+        """Read a table of measured curves, its text or a file, and return the name by which an ``answer`` shows it.
+
+        A table of errors without measured values serves a plan alone.
+        """
+        from sim.explorer.data import is_plan, table_of
+
+        key, table = key or secrets.token_hex(8), None
+        try:
+            table = table_of(source, name, self.scenario)
+        except BadInput:
+            if not is_plan(source, name, self.scenario):
+                raise
+        self.sources = dict([*self.sources.items()][1 - _KEPT :])
+        self.sources[key] = source, name
+        if table:
+            self.tables = dict([*self.tables.items()][1 - _KEPT :]) | {key: table}
+        return key
+
+    def planned(self, key: str) -> "Measured":
+        """Return a table as a plan of a measurement reads it."""
         from sim.explorer.data import table_of
 
-        key = key or secrets.token_hex(8)
-        table = table_of(source, name, self.scenario)
-        self._sources = dict([*self._sources.items()][1 - _KEPT :])
-        self._sources[key] = source, name
-        self.tables = dict([*self.tables.items()][1 - _KEPT :]) | {key: table}
-        return key
+        return table_of(*self.sources[key], self.scenario, is_plan=True)
 
     def toml(self, values: Mapping[str, Any]) -> str:
         """Return the scenario as TOML with values of the sliders."""
@@ -475,7 +496,7 @@ class Page:
         """
         source = self._asked.source
         result = Page(load(source.path, source.overrides))
-        for key, (content, name) in self._sources.items():
+        for key, (content, name) in self.sources.items():
             with contextlib.suppress(BadInput):
                 result.add(content, name, key)
         result._first = self._first if self._first in result.tables else None

@@ -165,10 +165,16 @@ class Guarded:
         if query.task == "ensemble":
             scenes = self._page.scenes(query.values, query.members)
             return command(functools.partial(ensemble, scenes, describes=True))
-        if (table := self._page.tables.get(query.data)) is None or not query.free:
-            raise Refused(400, "a fit needs a table and numbers that are free")
-        task = fitted if query.task == "fit" else planned
         scene = self._page.read(query.values)
+        needs_values = query.task == "fit"
+        known = self._page.tables if needs_values else self._page.sources
+        if query.data is None or query.data not in known or not query.free:
+            needed = "measured values" if needs_values else "a table"
+            raise Refused(400, f"this needs {needed} and numbers that are free")
+        if needs_values:
+            task, table = fitted, self._page.tables[query.data]
+        else:
+            task, table = planned, self._page.planned(query.data)
         return command(functools.partial(task, scene, table, query.free))
 
     async def _stream(

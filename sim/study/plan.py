@@ -140,7 +140,8 @@ class Plan(NamedTuple):
         return f"measure next at {' or '.join(point.words for point in self.best)}"
 
     def __repr__(self) -> str:
-        lines = [" ".join(map(str, row.values())) for rows in self.rows for row in rows]
+        each = itertools.chain.from_iterable(self.rows)
+        lines = ["; ".join(f"{name}: {row[name]}" for name in row) for row in each]
         return "\n".join(filter(None, [*lines, self.advice, *self.remarks]))
 
     @property
@@ -315,7 +316,8 @@ def plan(
         further = _rows(_read(candidates, base, table.names))
     if not further:
         remarks.append(
-            f"{table.path}: no column has the speed, so no further point is proposed; give --candidates"
+            f"{table.path}: no column has the speed, so no further point is proposed;"
+            " sim fit --plan --candidates takes some"
         )
     design = _Design(problem)
     if not design.parts:
@@ -369,7 +371,8 @@ def plan(
         can_rise = _is_more(certain, result.best[0].probabilities)
         if can_rise and best & {min(speeds), max(speeds)}:
             remarks.append(
-                "a best speed is the first or last candidate; speeds beyond may be better: give them by --candidates"
+                "a best speed is the first or last candidate; speeds beyond may be better:"
+                " sim fit --plan --candidates takes them"
             )
     return result._replace(remarks=tuple(remarks))
 

@@ -17,7 +17,7 @@ from sim.ensemble.diagnosis import slider_body
 from sim.explorer import take
 from sim.explorer.drawing import contact
 from sim.explorer.figures import rings
-from sim.explorer.job import ensemble, fitted
+from sim.explorer.job import ensemble, fitted, planned
 from sim.explorer.page import Page, Refused, previews
 from sim.explorer.server import Server, state_of
 from sim.laws import jkr
@@ -626,6 +626,48 @@ def test_rings_of_a_plan_are_on_the_curves_at_their_conditions():
         assert_allclose(mark["y"], factors[mark["of"]] * exact[mark["of"]], rtol=1e-9)
 
 
+def test_a_plan_takes_relative_errors_of_what_it_predicts_as_the_command_does(tmp_path):
+    path, free = tmp_path / "masking.csv", ["shear.spectrum.wavelength"]
+    # values far from the scenario's, which decide nothing
+    text = "speed [mm/s],contact_area [mm^2],contact_area_error [%]\n1,3,1\n3,2,1\n"
+    path.write_text(text, encoding="utf-8")
+    scene = sim.load("scenarios/masking.toml")
+    page = Page(scene)
+    said = planned(page.read({}), page.planned(page.add(path, "own")), free, print)
+    result = sim.plan(scene, path, free, sims=100)
+    (row,), _ = result.rows
+    for heading, words in row.items():
+        assert f"{heading}: {words}" in said["text"]
+
+
+def test_a_table_of_errors_alone_serves_a_plan():
+    page = Page(sim.load("scenarios/pdms_lens.toml"))
+    text = "speed [mm/s],contact_area_error [%]\n0.01,0.7\n0.9,0.7\n"
+    key = page.add(text, "points.csv")
+    assert key not in page.tables
+    assert "plan" in page.answer({}, 0.1, table=key)["data"]["words"]
+    assert page.figure({}, "data", key)["panels"] == []
+    table = page.planned(key)
+    found = planned(page.read({}), table, ["bonds.critical_speed"], print)
+    assert "P(told apart)" in found["text"] and found["marks"] == []
+    # a table without errors is refused by the words of a fit
+    with pytest.raises(sim.BadInput, match="measured"):
+        page.add("speed [mm/s]\n1\n2\n", "none.csv")
+
+
+def test_chi_square_of_a_table_is_stated_over_a_sweep_too():
+    page = Page(sim.load("scenarios/masking.toml"))
+    text = (
+        "speed [mm/s],contact_area [mm^2],contact_area_error [%]\n1,0.03,1\n3,0.03,1\n"
+    )
+    key = page.add(text, "own.csv")
+    over_sweep, over_speed = (
+        page.answer({}, 0.1, figure, key)["data"] for figure in ("sweep", "speed")
+    )
+    assert "χ²" in over_sweep["words"] and over_sweep["words"] == over_speed["words"]
+    assert over_speed["points"] and not over_sweep["points"]
+
+
 def test_numbers_are_written_back_after_their_difference_and_the_page_follows_the_file(
     tmp_path,
 ):
@@ -664,7 +706,7 @@ def test_a_table_without_units_says_so_and_one_of_radii_has_points(lens):
     page = Page(sim.load(lens))
     text = "speed,contact_radius,contact_radius_error\n1,1.1e-4,1e-6\n2,1e-4,1e-6\n"
     answer = page.answer({}, 0.1, table=page.add(text, "radii.csv"))
-    assert "SI" in answer["data"]["remark"]
+    assert "SI" in answer["data"]["words"]
     points = answer["data"]["points"]["contact_area"]
     assert_allclose(points["values"], np.pi * np.array([1.1e-4, 1e-4]) ** 2, rtol=1e-12)
     assert_allclose(

@@ -308,17 +308,8 @@ function data(state) {
   const found = curvesOf(state)?.data;
   $("free").hidden = !table;
   $("fit").disabled = $("plan").disabled = !table || Boolean(state.job);
-  if (found) {
-    const residuals = Object.values(/** @type {Record<string, any>} */ (found.points)).flatMap(
-      (points) => points.residuals,
-    );
-    const sizes = residuals.filter((value) => value !== null).map(Math.abs);
-    const far = sizes.length ? `, largest residual ${Math.max(...sizes).toPrecision(2)} standard errors` : "";
-    const square = found.count
-      ? `χ² = ${found.chi_square.toPrecision(4)} for ${found.count} numbers${far}`
-      : "without errors there is no χ²";
-    say("judged", `${found.name}: ${square}${found.remark ? `; ${found.remark}` : ""}`);
-  } else if (!$("judged").dataset.fault) say("judged", "");
+  if (found) say("judged", `${found.name}: ${found.words}`);
+  else if (!$("judged").dataset.fault) say("judged", "");
   $("fitted").hidden = !fit;
   if (!fit) return;
   const isPresent = isFitted(state);
