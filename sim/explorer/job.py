@@ -27,6 +27,8 @@ _DRAWN = 1000
 _SIMS = 100
 #: Quantities that are drawn.
 _NAMES = ("contact_area", "friction_force")
+#: Forces of a motion in words.
+_FORCES = {"spring_force": "spring force", "friction_force": "friction"}
 
 #: Begins a job: the server alone decides about the end of it, also while its modules are imported.
 _BEGIN = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN); from sim.explorer.job import main; main()"
@@ -122,10 +124,13 @@ def fitted(scenario: Scenario, table: Any, free: list[str], say: Say) -> dict[st
 def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
     """Return what is shown of a run [SI]: means over members with their 95 % intervals.
 
-    Of a motion they are, in words, the means of each member's largest friction and smallest area. If the speed changes,
+    Of a motion they are, in words, the means of each member's largest force and smallest area. If the speed changes,
     they are area and friction at each time; else those of the second half of the run, a single point.
     """
-    (data,) = xr.broadcast(dataset[[*_NAMES, "jkr_radius", "speed"]])
+    force = "spring_force" if "spring_force" in dataset else "friction_force"
+    names = {*_NAMES, force, "jkr_radius", "speed"}
+    (data,) = xr.broadcast(dataset[sorted(names)])
+    apart = float(dataset["t"][1] - dataset["t"][0]) if dataset.sizes["t"] > 1 else 0.0
     data = data if "member" in data.dims else data.expand_dims("member")
     data["area_ratio"] = data["contact_area"] / (
         np.pi * data["jkr_radius"].where(data["jkr_radius"] > 0.0) ** 2
@@ -136,7 +141,7 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
         words = [
             f"{name} {engineering(float(mean), unit)} ± {engineering(float(half), unit)}"
             for name, values, unit in (
-                ("largest friction", data["friction_force"].max("t"), "N"),
+                (f"largest {_FORCES[force]}", abs(data[force]).max("t"), "N"),
                 ("smallest area", data["contact_area"].min("t"), "m^2"),
             )
             for mean, half in [_interval(values)]
@@ -145,6 +150,7 @@ def summary(scene: Scenario, dataset: xr.Dataset) -> dict[str, Any]:
         from sim.plots.curves import coarse_slips
         from sim.read.tables import unresolved
 
+        words.append(f"at times {engineering(apart, 's')} apart")
         words += filter(None, [coarse_slips(dataset), unresolved(dataset)])
         return {"along": "t", "members": members, "words": ", ".join(words)}
     if float(np.ptp(speed.to_numpy())) == 0.0:

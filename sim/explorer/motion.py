@@ -6,11 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.ensemble.variables import READ
+from sim.ensemble.variables import LARGEST, READ
 from sim.explorer.drawing import listed
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
 from sim.step.state import MemberNoise, State, pack
+from sim.units.notation import engineering
 
 #: Parts of a long motion that is drawn beside another one.
 _PARTS = 200
@@ -25,7 +26,7 @@ _ALWAYS = (
     "speed",
 )
 _DRIVEN = ("slider_position",)
-_SPRING = ("stage_position", "spring_force")
+_SPRING = ("stage_position", "stage_speed", "spring_force")
 _MOUNT = ("normal_load", "indentation", "displacement")
 
 
@@ -58,8 +59,8 @@ class Motions:
         -------
         dict
             ``run``, ``first`` and ``last`` step, ``duration`` [s], ``is_new`` (True if the motion
-            began anew, because it is unknown or its arrays have other shapes), and ``columns`` in SI
-            by name, of which ``t`` is the time.
+            began anew, because it is unknown or its arrays have other shapes), ``columns`` in SI
+            by name, of which ``t`` is the time, and ``words`` on the slip events since its start.
         """
         stepper, noise = scene.stepper, MemberNoise.of(scene.seed, np.arange(1))
         start = stepper.start(noise)
@@ -94,6 +95,7 @@ class Motions:
             "steps": whole,
             "is_new": bool(is_new),
             "columns": columns,
+            "words": _slip_events(scene, state),
         }
 
 
@@ -113,6 +115,29 @@ def course(scene: Scenario) -> dict[str, list[float | None]]:
             kept |= {int(part[here.argmin()]), int(part[here.argmax()])}
     order = sorted(kept)
     return {name: _rounded(values[order]) for name, values in columns.items()}
+
+
+def _slip_events(scene: Scenario, state: State) -> str:
+    """Return the number of slip events and the speeds of the stage at which they set in and end, in words.
+
+    They are those of ``sim run``; "" if no stage pulls.
+    """
+    if scene.drive.model != "spring":
+        return ""
+    read = {row.name: row.read for row in LARGEST if row.part == "drive"}
+    count = int(read["slip_count"](scene, state)[0])
+    if not count:
+        return "no slip event"
+    words = f"{count} slip event{'s' * (count > 1)}"
+    for side, *order in (
+        ("from", "onset_steady_speed", "onset_slip_speed"),
+        ("up to", "end_slip_speed", "end_steady_speed"),
+    ):
+        ends = [float(read[one](scene, state)[0]) for one in order]
+        if np.isfinite(ends).all():
+            between = " and ".join(engineering(end, "m/s") for end in ends)
+            words += f", {side} a stage speed between {between}"
+    return words
 
 
 def _columns(scene: Scenario, courses: list[Any]) -> dict[str, Array]:

@@ -5,7 +5,6 @@ import difflib
 import itertools
 import math
 import secrets
-import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -47,8 +46,10 @@ _LOADS, _MOST_OTHERS = (0.25, 4.0), 8
 _TURNS = 30.0
 #: Longest time of the motions of other points [s].
 _LONGEST = 8.0
-#: Members of the band, time that it may take [s], and time after which it is tried again [s].
-_FEW, _QUICK, _PAUSE = 8, 0.05, 5.0
+#: Members of the band, and time that it may take by its number of steps [s].
+_FEW, _QUICK = 8, 0.5
+#: Records of all members up to which a motion is recorded at each clock step.
+_RECORDS = 1_000_000
 #: Keys that matter most for the area and are marked; tables that are kept.
 _MARKED, _KEPT = 3, 8
 #: Shares of the mechanisms in the work of adhesion; 0 switches a mechanism off.
@@ -124,7 +125,6 @@ class Page:
         self.axis = _axis(scenario)
         self.sliders = list(self._sliders())
         self.motions = Motions()
-        self._slow_until, self._has_run = 0.0, False
         self._moves = any(previews(self.scenario))
         self._map = _map(scenario)
         self._first = self._beside() if data is None else self.add(data, str(data))
@@ -394,20 +394,19 @@ class Page:
             scene.clock.steps * seconds_a_step(scene, scene.ensemble.members)
             for scene in scenes
         )
-        if estimate > 10.0 * _QUICK or time.monotonic() < self._slow_until:
+        # by counted work alone, so that a busy machine hides no curve
+        if estimate > _QUICK:
             return {"reason": "eight members take too long to follow the sliders"}
-        began = time.monotonic()
-        result = ensemble(scenes, lambda message: None)
-        now = time.monotonic()
-        # the first run also loads and compiles, and the estimate is rough
-        if self._has_run and now - began > _QUICK:
-            self._slow_until = now + _PAUSE
-        self._has_run = True
-        return result
+        return ensemble(scenes, lambda message: None)
 
     def scenes(self, values: Mapping[str, Any], members: int) -> list[Scenario]:
-        """Return what an ensemble runs: the scenario, at each speed of a sweep over the speed alone."""
+        """Return what an ensemble runs: the scenario, at each speed of a sweep over the speed alone.
+
+        A motion that is not too long is recorded at each clock step, as the page draws it.
+        """
         scene = self.read(dict(values) | {"ensemble.members": members})
+        if self._moves and members * scene.clock.steps <= _RECORDS:
+            scene = scene.with_values({"clock.record": scene.clock.step})
         axes = self._asked.sweep
         if len(axes) == 1 and axes[0].keys == ("drive.speed",):
             return [

@@ -5,8 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 import sim
-from sim.explorer.job import summary
+from sim.explorer.job import ensemble, summary
 from sim.explorer.motion import Motions
+from sim.explorer.page import Page
 from sim.units.notation import engineering
 
 #: Digits that are sent are six.
@@ -99,11 +100,39 @@ def test_a_run_of_a_motion_states_the_extremes_of_its_members_with_intervals(spr
     run = sim.run(spring)
     drawn = summary(spring, run)
     assert drawn["along"] == "t" and drawn["members"] == 4
-    largest = run["friction_force"].max("t").to_numpy()
+    largest = run["spring_force"].max("t").to_numpy()
     # Student's quantile for three degrees of freedom
     half = 3.182446305284263 * largest.std(ddof=1) / 2.0
     words = f"{engineering(largest.mean(), 'N')} ± {engineering(half, 'N')}"
-    assert f"largest friction {words}" in drawn["words"]
+    assert f"largest spring force {words}" in drawn["words"]
+
+
+def test_a_run_of_a_motion_has_the_extremes_of_the_motion_that_is_drawn():
+    page = Page(sim.load("scenarios/stick_slip.toml"))
+    columns, _ = whole(Motions(), page.read({}))
+    drawn = ensemble(page.scenes({}, 2), lambda message: None)["words"]
+    most, least = columns["spring_force"].max(), columns["contact_area"].min()
+    assert f"largest spring force {engineering(most, 'N')} ±" in drawn
+    assert f"smallest area {engineering(least, 'm^2')} ±" in drawn
+    assert "at times 1 ms apart" in drawn
+
+
+def test_the_speeds_of_the_stage_at_which_slip_events_begin_are_those_of_a_run():
+    def words(changes):
+        scene, motions = sim.load("scenarios/stick_slip.toml", changes), Motions()
+        _, run = whole(motions, scene)
+        # the state before the last block is kept
+        last = max(step for step in range(scene.clock.steps) if step % 40 == 0)
+        return motions.advance(scene, run, last)["words"], scene
+
+    text, scene = words({})
+    run = sim.run(scene)
+    assert text.startswith(f"{int(run['slip_count'].item())} slip events, from")
+    for name in ("onset_steady_speed", "onset_slip_speed"):
+        assert engineering(run[name].item(), "m/s") in text
+    assert words({"drive.stage": "1 mm/s"})[0] == "no slip event"
+    creep = sim.load("scenarios/creep.toml", {"sweep": {}})
+    assert Motions().advance(creep, "", 0)["words"] == ""
 
 
 def test_a_run_whose_slips_are_not_resolved_says_so_and_another_one_does_not(spring):

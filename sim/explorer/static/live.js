@@ -38,11 +38,12 @@ export function ratio(rate) {
   return rate < 1 ? `1 : ${number}` : `${number} : 1`;
 }
 
-/** Return what stands beside the picture: time, force, area and speed.
+/** Return what stands beside the picture: time, speed of the stage, force, area and speed of the slider.
  * @param {State} state */
 export function reading({ motion }) {
   const words = [`t = ${engineering(motion.time, "s")}`];
   for (const [name, symbol, unit] of [
+    ["stage_speed", "stage at", "m/s"],
     ["spring_force", "spring force", "N"],
     ["normal_load", "load", "N"],
     ["contact_area", "area", "m^2"],

@@ -278,7 +278,8 @@ function course({ motion, start }) {
           .map(({ from }) => engineering(from, "s"))
           .join(", ")}`
       : "";
-  return `First member, ${extent}: ${force} ${range(name, "N")}, area ${range("contact_area", "m^2")}${changed}`;
+  const events = motion.words && pieces.length < 2 ? `${motion.words}; ` : "";
+  return `First member, ${extent}: ${events}${force} ${range(name, "N")}, area ${range("contact_area", "m^2")}${changed}`;
 }
 
 /** Show the job, its end, and a trace.

@@ -18,7 +18,7 @@ import { engineering } from "./notation.js";
  * @typedef {{ of: any, answer: any }} Answer */
 /** The course of a motion. From each time of `pieces` on it is that of other numbers.
  * @typedef {{ run: string, last: number, steps: number, pieces: { from: number, of: Values }[],
- *   columns: Record<string, (number | null)[]>, time: number, paused: boolean, rate: number, note: string }} Motion */
+ *   columns: Record<string, (number | null)[]>, time: number, paused: boolean, rate: number, note: string, words: string }} Motion */
 /** @typedef {{ start: Start, values: Values, view: View, past: Snapshot[], future: Snapshot[], gesture: string,
  *   dragging: boolean, touched: string, accepted: Values | null,
  *   refusal: { key: string, text: string, reason: string, typed: boolean } | null,
@@ -82,7 +82,7 @@ function still(start) {
   const wanted = Math.round(Math.log10(start.duration / 20));
   const rate = 10 ** Math.min(3, Math.max(-2, wanted));
   const columns = { t: [] };
-  return { run: "", last: 0, steps: 0, pieces: [], columns, time: 0, paused: false, rate, note: "" };
+  return { run: "", last: 0, steps: 0, pieces: [], columns, time: 0, paused: false, rate, note: "", words: "" };
 }
 
 /** Return true if two lists of numbers are the same.
@@ -290,7 +290,7 @@ export const tabled = (state, table) => ({ ...state, table, fit: null });
  * @returns {State} */
 export function continued(state, of, answer) {
   const { motion, start } = state;
-  const { run, first, last, steps, is_new: isNew, duration, columns } = answer;
+  const { run, first, last, steps, is_new: isNew, duration, columns, words } = answer;
   const from = (duration * first) / steps;
   const time = of.run || hasEnded(motion, start) ? 0 : motion.time;
   const old = isNew ? { ...still(start), paused: motion.paused, rate: motion.rate, time } : motion;
@@ -306,7 +306,7 @@ export function continued(state, of, answer) {
   const pieces = isSame ? before : [...before, { from, of: of.values }];
   const note =
     isNew && of.step > 0 ? "The motion began anew, because the change alters the shape of the arrays." : motion.note;
-  return { ...state, motion: { ...old, run, last, steps, columns: joined, pieces, note } };
+  return { ...state, motion: { ...old, run, last, steps, columns: joined, pieces, note, words } };
 }
 
 /** Return the number of times up to a time, within half a step.
@@ -318,10 +318,11 @@ function count(times, time, step) {
   return found + 1;
 }
 
-/** Return the request that continues the motion, or null if it has all of its steps under the present numbers.
+/** Return the request that continues the motion, or null if it has all of its steps under the present numbers. What is
+ * dragged acts at its end, so that one gesture makes one change.
  * @param {State} state */
-export function nextOfMotion({ motion, start, values, view }) {
-  if (view.figure !== "motion") return null;
+export function nextOfMotion({ motion, start, values, view, dragging }) {
+  if (view.figure !== "motion" || dragging) return null;
   const isOf = same(motion.pieces.at(-1)?.of, values);
   if (isOf && motion.last === motion.steps && motion.steps > 0) return null;
   if (isOf) return { values, run: motion.run, step: motion.last };

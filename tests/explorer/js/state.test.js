@@ -135,7 +135,10 @@ test("a motion goes on from the block that is shown, under the new numbers", () 
   assert.equal(change.played(state, 1000).motion.time, 2);
   state = change.played(state, 10); // at 1 : 10
   assert.ok(Math.abs(state.motion.time - 1) < 1e-12);
-  state = change.moved(state, { [LOAD]: 5e-3 });
+  // what is dragged acts at its end
+  state = change.moved(state, { [LOAD]: 6e-3 }, LOAD);
+  assert.equal(change.nextOfMotion(state), null);
+  state = change.rested(change.moved(state, { [LOAD]: 5e-3 }, LOAD));
   const next = change.nextOfMotion(state);
   assert.deepEqual([next.run, next.step, next.values[LOAD]], ["r", 100, 5e-3]);
   state = change.continued(state, next, part(100, 200, false));
