@@ -11,7 +11,9 @@ from sim.spectrum.families import Ripple
 from sim.study.curves import curves
 
 #: Points of a profile, and along a side of the map; sides over the radius of the contact.
-_PROFILE, _MAP, _WIDE = 161, 64, 4.0
+_PROFILE, _MAP, _WIDE = 161, 128, 4.0
+#: Pixels of a single wave, below which it is not drawn.
+_FINE = 4.0
 
 
 def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
@@ -20,7 +22,7 @@ def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
     ``radius`` and ``jkr_radius`` are in m, 0 if the contact is open; ``fluctuation_energy`` is in J/m². ``x``,
     ``sphere`` and ``surface`` are profiles [m], positive upwards from the undeformed half-space. ``stress`` is a map of
     one realisation of the shear stress [Pa], its mean included, of the side ``side`` [m]; None if the stress is the
-    same everywhere.
+    same everywhere, or a wave too short to be drawn.
     """
     at_speed = {
         name: float(values[0])
@@ -78,6 +80,8 @@ def _stress(
     except ValueError:  # of a single wave, which has no density
         place = pixel * np.arange(_MAP)
         qx, qy = cast(Ripple, shear.spectrum).wavevector
+        if 2.0 * math.pi / math.hypot(qx, qy) < _FINE * pixel:
+            return None
         field = math.sqrt(2.0 * shear.spectrum.variance) * np.cos(
             qx * place[:, np.newaxis] + qy * place
         )

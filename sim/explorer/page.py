@@ -509,8 +509,12 @@ class Page:
 
     def words(self, values: Mapping[str, Any]) -> dict[str, list[str]]:
         """Return the diagnosis and the remarks of ``sim check`` for values of the sliders."""
-        plan = Plan.of(self.read(values))
-        return {"diagnosis": diagnosis(plan), "remarks": remarks(plan)}
+        scene = self.read(values)
+        plan, said = Plan.of(scene), []
+        if self.axis:  # the figure has other values of this number
+            change = {self.axis: quantities(scene)[self.axis][1]}
+            said = [f"at {_words_of(scene, change)}, the number of its slider"]
+        return {"diagnosis": said + diagnosis(plan), "remarks": remarks(plan)}
 
     def _sliders(self) -> Iterator[Slider]:
         """Yield the sliders of all numbers that change a curve."""

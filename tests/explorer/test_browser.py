@@ -526,6 +526,39 @@ def test_a_small_screen_has_no_sideways_scroll_large_targets_and_contrast(
         assert page.evaluate(back) != before[0]
 
 
+def test_a_small_screen_cuts_neither_the_sentence_nor_a_label(browser):
+    with scenario(browser, "pdms_lens", viewport={"width": 390, "height": 800}) as page:
+        wait(page, lambda: page.locator("#plot [data-name=own]").count(), "no band")
+        idle(page)
+        assert "masked between" in lost(page)
+        clipped = "(item) => item.scrollHeight > item.clientHeight"
+        assert not page.locator("#lost").evaluate(clipped)
+        ends = page.locator("#plot svg text").evaluate_all(
+            "(each) => each.map((one) => one.getBoundingClientRect().right)"
+        )
+        assert max(ends) <= page.locator("#plot svg").evaluate(
+            "(item) => item.getBoundingClientRect().right"
+        )
+        # the table has the panels of a wider screen, too
+        page.locator("#numbers summary").click()
+        wait(page, lambda: page.locator("#numbers th").count() > 4, "no table")
+        assert "F (mN)" in page.locator("#numbers th").all_text_contents()
+
+
+def test_a_picture_without_room_is_drawn_without_a_fault(shown):
+    shown.locator("#words").evaluate("(item) => (item.style.display = 'none')")
+    enter(shown, "8 mN", LOAD)
+    idle(shown)
+    assert shown.said == []
+
+
+def test_the_order_of_subtraction_is_a_choice_only_of_two_mechanisms(browser):
+    for name, has_order in (("pdms_lens", True), ("masking", False)):
+        with scenario(browser, name) as page:
+            idle(page)
+            assert page.locator("#first").is_visible() == has_order
+
+
 def test_a_swipe_over_the_figure_scrolls_the_page(browser, served):
     with opened(
         browser,
@@ -622,7 +655,7 @@ def test_an_ensemble_of_other_numbers_is_drawn_as_such(random):
     idle(random)
     assert "earlier" not in ran.text_content()
     assert not random.locator("#plot [data-name=ran]").count()
-    assert "own models, mean of 64" in random.locator("#plot").text_content()
+    assert "mean of 64 members" in random.locator("#plot").text_content()
     random.locator("#members").fill("")
     random.locator("#run").click()
     wait(random, lambda: "between 1 and 100000" in ran.text_content(), "no reason")
@@ -927,7 +960,7 @@ def test_a_saved_figure_is_the_one_that_is_seen(random):
     wait(random, lambda: "8 members" in random.locator("#ran").text_content(), "no run")
     idle(random)
     text = saved(random, "svg").read_text(encoding="utf-8")
-    for word in ("measured", "own models, mean of 8", "area A (mm²)", "<desc"):
+    for word in ("measured", "mean of 8 members", "area A (mm²)", "<desc"):
         assert word in text
     drawn = random.locator("#plot [data-name=area]").get_attribute("d")
     assert f'd="{drawn}"' in text
@@ -1036,7 +1069,21 @@ def test_curves_are_read_by_keyboard_and_as_a_table(shown):
     place = int(shown.locator("#at").input_value())
     curves = shown.evaluate("explored.answers.curves.answer.curves")
     exact = 100.0 * curves["area_ratio"][place]
-    assert f"area, area (% of JKR's) {exact:.4g}" in reading.text_content()
+    # a value has its name and its unit, and stands below the line in the figure
+    assert f" · area {exact:.4g} % of JKR's" in reading.text_content()
+    at, rule = shown.locator("#at"), shown.locator("#plot [data-name=reading]").first
+    for place in (0, 60, 120):
+        at.evaluate(
+            """(item, place) => { item.value = place;
+            item.dispatchEvent(new Event("input", { bubbles: true })); }""",
+            place,
+        )
+        idle(shown)
+        box = at.bounding_box()
+        line = rule.evaluate("(item) => item.getBoundingClientRect().left")
+        # the thumb is 16 px wide; lines are drawn to a tenth of a pixel
+        thumb = box["x"] + 8.0 + (box["width"] - 16.0) * place / 120.0
+        assert abs(thumb - line) < 1.0
     assert reading.get_attribute("aria-live") == "polite"
     assert shown.locator("#plot svg title").text_content()
     shown.locator("#numbers summary").click()
@@ -1225,11 +1272,11 @@ class Walk:
         columns = steady(self.model.read(values), np.array(facts["x"]))
         name = "contact_area" if facts["view"]["absolute"] else "area_ratio"
         exact = float(columns[name][facts["place"]])
-        shown = re.search(r"; area, area (?:A )?\(([^)]*)\) ([^;]+)", facts["reading"])
-        factor = {"% of JKR's": 100.0, "m²": 1.0, "mm²": 1e6, "µm²": 1e12}[shown[1]]
+        shown = re.search(r"; area (\S+) ([^;]+)", facts["reading"])
+        factor = {"% of JKR's": 100.0, "m²": 1.0, "mm²": 1e6, "µm²": 1e12}[shown[2]]
         if math.isfinite(exact):
             assert_allclose(
-                float(shown[2].replace("−", "-")), factor * exact, rtol=1e-3
+                float(shown[1].replace("−", "-")), factor * exact, rtol=1e-3
             )
         # a table may have widened the axis
         if facts["x"][-1] < 1.1 * self.model.speeds[-1]:

@@ -26,6 +26,7 @@ from sim.laws import jkr
 from sim.parts.shear import models
 from sim.study.curves import curves, speeds_of_loss
 from sim.study.likelihood import problem_of
+from sim.units.notation import engineering
 
 SCENARIOS = (
     "pdms_lens",
@@ -661,6 +662,30 @@ def test_chi_square_of_a_table_is_stated_over_a_sweep_too():
     )
     assert "χ²" in over_sweep["words"] and over_sweep["words"] == over_speed["words"]
     assert over_speed["points"] and not over_sweep["points"]
+
+
+def test_a_wave_has_four_pixels_or_no_picture():
+    scene = sim.load("scenarios/masking.toml").with_values({})
+    found = contact(scene, 3e-3)
+    stress = np.array(found["stress"])
+    assert found["side"] / len(stress) <= 24e-6 / 4.0
+    # all crests are seen: none is missed by more than half a pixel
+    row = stress[:, 0]
+    inner = (row[1:-1] > row[:-2]) & (row[1:-1] >= row[2:])
+    phase = np.pi * found["side"] / len(stress) / 24e-6
+    assert np.all(row[1:-1][inner] >= 0.999 * 375e3 * np.cos(phase))
+    assert inner.sum() == pytest.approx(found["side"] / 24e-6, abs=1.0)
+    short = scene.with_values({"shear.spectrum.wavelength": 1e-6})
+    assert contact(short, 3e-3)["stress"] is None
+
+
+def test_the_diagnosis_over_a_sweep_names_the_number_that_it_is_for():
+    page = Page(sim.load("scenarios/masking.toml"))
+    for amplitude in (375e3, 200e3):
+        first, *_ = page.words({"shear.spectrum.amplitude": amplitude})["diagnosis"]
+        assert engineering(amplitude, "Pa") in first
+    lens = Page(sim.load("scenarios/pdms_lens.toml"))
+    assert not any("its slider" in line for line in lens.words({})["diagnosis"])
 
 
 def test_numbers_are_written_back_after_their_difference_and_the_page_follows_the_file(

@@ -94,4 +94,4 @@ export function nameOfRun(state) {
 
 /** Return what an ensemble of the present numbers is called.
  * @param {number} members */
-export const nameOf = (members) => (members > 1 ? `own models, mean of ${members}` : "own models");
+export const nameOf = (members) => (members > 1 ? `mean of ${members} members` : "own models");

@@ -268,6 +268,7 @@ function ofRun(state, name, factor, axis) {
           high: times(high, factor),
           colour: COLOURS.own,
           opacity: 0.2,
+          name: "interval",
         }),
         dashed,
       ];
@@ -414,7 +415,10 @@ export function tableOf(shown) {
   ]);
   const head = [
     shown[0].x.label,
-    ...same.map(({ mark, y }) => [mark.label || mark.name?.replaceAll("_", " "), y.label].filter(Boolean).join(", ")),
+    ...same.map(({ mark, y }) => {
+      const name = mark.label || mark.name?.replaceAll("_", " ");
+      return name ? `${name}${/ \(.*\)$/.exec(y.label) ?? ""}` : y.label;
+    }),
   ];
   return { head, rows: rows.filter((_, k) => k % every === 0) };
 }

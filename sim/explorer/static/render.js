@@ -160,6 +160,10 @@ export function render(state, screen) {
     const box = /** @type {HTMLInputElement} */ (item);
     box.checked = state.values[box.value] !== 0;
   }
+  // of one mechanism alone there is no order
+  $("first").parentElement.hidden = !["lost_to_bonds", "lost_to_fluctuations"].every((name) =>
+    curvesOf(state)?.curves[name]?.some((/** @type {number} */ lost) => lost > 1e-6),
+  );
   const place = state.start.points.findIndex((point) =>
     Object.entries(point).every(([key, value]) => state.values[key] === value),
   );
@@ -373,11 +377,11 @@ function plot(state, { isDark, isNarrow }) {
     return;
   }
   /** @type {ReturnType<typeof tableOf>} */
-  const table = describedOf(state)?.answer.table ?? tableOf(shown);
+  const table = describedOf(state)?.answer.table ?? tableOf(panels(state, look, false));
   $("reader").hidden = !table.rows.length;
-  const mark = readAt(state, shown, table);
   drawn.width = Math.max(300, $("plot").clientWidth);
   drawn.shared = isMotion ? !motion.columns.normal_load : !["data", "map"].includes(view.figure);
+  const mark = readAt(state, shown, table);
   const name = `${state.start.title}: ${NAMES[view.figure]}`;
   const description = $("lost").textContent;
   const about = { width: drawn.width, theme: look, title: name, description, shared: drawn.shared };
@@ -412,12 +416,16 @@ function plot(state, { isDark, isNarrow }) {
 function readAt(state, shown, table) {
   const last = table.rows.length - 1;
   $("at").max = String(last);
-  const place = Math.min(last, state.reading ?? Math.round(last / 2));
+  const place = Math.min(last, state.reading ?? 0);
   if (Number($("at").value) !== place) $("at").value = String(place);
   const row = table.rows[place] ?? [];
-  const words = table.head.map(
-    (text, k) => `${text} ${row[k] === null || row[k] === undefined ? "–" : ticked(Number(digits(Number(row[k]))))}`,
-  );
+  const { left, right } = frames(shown, drawn.width, drawn.shared);
+  $("at").style.width = `${right - left + 16}px`;
+  const words = table.head.map((text, k) => {
+    const [, name, unit = ""] = /^(.*?)(?: \((.*)\))?$/.exec(text) ?? [];
+    const value = row[k] === null || row[k] === undefined ? "–" : ticked(Number(digits(Number(row[k]))));
+    return `${name} ${value} ${unit}`.trim();
+  });
   $("at").setAttribute("aria-valuetext", words.join("; "));
   const text = state.reading === null ? "" : words.join(" · ");
   if ($("reading").textContent !== text) $("reading").textContent = text;
@@ -555,7 +563,7 @@ function contact(state, { isDark }) {
     dash,
   });
   const ends = scale([-half, half]);
-  const width = Math.min($("words").clientWidth, 460);
+  const width = Math.max(300, Math.min($("words").clientWidth, 460));
   const wide = { label: `along the sliding direction (${unit})`, low: ends[0], high: ends[1], log: false };
   const heights = scale([...found.surface, ...found.sphere]);
   const [low, high] = [Math.min(...heights), Math.max(...heights)];

@@ -72,7 +72,7 @@ test("a run of other numbers is named by them", () => {
   const of = { task: "ensemble", values: state.values, members: 8 };
   const moved = change.finished(change.moved(state, { [LOAD]: 16e-3 }), of, { members: 8, along: "speed" });
   assert.equal(nameOfRun(moved), "ran at P = 4 mN");
-  assert.equal(nameOfRun(change.undone(moved)), "own models, mean of 8");
+  assert.equal(nameOfRun(change.undone(moved)), "mean of 8 members");
   assert.equal(differences(moved, moved.values), "");
 });
 
