@@ -55,13 +55,13 @@ def steady_law(
 ) -> np.ndarray:
     """Return shear stress [Pa] and bond fraction [1] of a scenario's bonds in steady sliding at speeds [m/s].
 
-    They are nan if the scenario cannot be read.
+    The stress has the sign of the speed. Both are nan if the scenario cannot be read.
     """
     scenario = scenario_at(dataset, point)
     if scenario is None:
         return np.full((2, speed.size), np.nan)
     steady = scenario.population.steady(speed)
-    return np.stack([steady.strength, steady.fraction])
+    return np.stack([np.copysign(steady.strength, speed), steady.fraction])
 
 
 # -- behind a spring, or under a force ----------------------------------------------------------
