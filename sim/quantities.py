@@ -1062,8 +1062,8 @@ OF_MEMBERS: tuple[Definition, ...] = (
     Definition(
         "loop_energy",
         "J",
-        "work of the mount in a cycle, the closed integral of load over displacement",
-        heading="∮P dΔ, per cycle",
+        "work of the mount in a cycle, the integral of load over displacement",
+        heading="∫P dΔ, per cycle",
         absent="a cycle is not closed",
     ),
     Definition(

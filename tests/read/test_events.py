@@ -211,7 +211,7 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
         assert errors[1] < 0.5 * errors[0]
         headings = set(rows_of(dataset, read.highlights)[0])
         assert {heading.partition(" (")[0] for heading in headings} >= {
-            "∮P dΔ, per cycle",
+            "∫P dΔ, per cycle",
             "dissipated, per cycle",
             "detached, of members",
         }
