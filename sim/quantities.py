@@ -461,10 +461,7 @@ DERIVED: tuple[Definition, ...] = (
     Definition(
         "area_ratio",
         "1",
-        (
-            "contact area over the JKR area at the full work of adhesion, with a range "
-            "of adhesion over the area of such a contact"
-        ),
+        "contact area over that of the contact at the full work of adhesion",
         symbol="A/A_JKR",
         heading="A/A_JKR",
         form=Form.PERCENT,

@@ -304,7 +304,8 @@ def _shares(run: Run) -> list[str]:
 
 def _sentence(one: Estimate, row: Definition) -> str:
     """Return a sentence on a quantity, of a sweep at the first and last point where it is known."""
-    text = one.value.long_name
+    # what a semicolon parts is for a table of meanings
+    text = str(one.value.long_name).partition(";")[0]
     subject = f"The {text}{',' * (',' in text)} is"
     known = {}
     for place in np.ndindex(one.value.shape):
