@@ -461,7 +461,7 @@ DERIVED: tuple[Definition, ...] = (
     Definition(
         "area_ratio",
         "1",
-        "contact area over that of the contact at the full work of adhesion",
+        "contact area over that at the full work of adhesion",
         symbol="A/A_JKR",
         heading="A/A_JKR",
         form=Form.PERCENT,

@@ -19,7 +19,7 @@ from sim.laws.schallamach import (
     resolved_onset,
 )
 from sim.parts.bonds.models import Cohort, FirstMoment
-from sim.plots import curves, draw
+from sim.plots import curves, draw, style
 from sim.read import slips
 
 #: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.
@@ -38,6 +38,11 @@ def driven(kind):
             Force(force=0.5 * most),
             0.2,
             {"drive.force": [0.5 * most, 1.3 * most]},
+        ),
+        "both ways": (
+            Force(force=0.5 * most),
+            0.2,
+            {"drive.force": [-0.5 * most, 0.5 * most]},
         ),
         "map": (
             Spring(stage=ramp, stiffness=100.0, damping=1e-2, start="steady"),
@@ -172,6 +177,28 @@ def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_l
     own = lines_of(figure.axes[0])[-1]
     assert_allclose(own[0], 1e3 * force[:top], rtol=1e-12)
     assert_allclose(own[1], area[:top] / area[0], rtol=1e-12)
+
+
+def test_creep_in_both_directions_is_drawn_on_linear_axes_which_show_both():
+    position, speed = rendered(draw(driven("both ways"), "creep")).axes
+    assert position.get_yscale() == speed.get_yscale() == "linear"
+    back, forth = lines_of(position)
+    assert_allclose(back[1], -forth[1], rtol=1e-9)
+
+
+def test_a_legend_has_no_name_of_a_line_without_a_point():
+    figure, (panel,) = style.rows([2.0])
+    panel.set_yscale("log")
+    x, nothing = [1.0, 2.0], [math.nan, math.nan]
+    panel.plot(x, x, label="drawn")
+    panel.plot(x, nothing, label="missing")
+    panel.plot(x, [-1.0, -2.0], label="without a logarithm")
+    panel.errorbar(x, nothing, nothing, label="missing with bars")
+    panel.errorbar(x, x, x, label="drawn with bars")
+    panel.plot([], [], label="a sample of a look")
+    style.legend(panel)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {*names} == {"drawn", "drawn with bars", "a sample of a look"}
 
 
 def pulled(exponent):
