@@ -32,7 +32,8 @@ Places = Mapping[Any, xr.DataArray]
 MOST = 10
 #: Values of a sweep from which on an extreme inside is worth a note.
 _TURNS = 3
-#: Shares below it are nothing; spread over the mean below which a motion without noise has settled.
+#: Shares, and values over the largest of a column, below which they are of rounding; spread over the mean below
+#: which a motion without noise has settled.
 _ROUNDING, _SETTLED = 1e-13, 1e-3
 #: Ratio of the largest value of a column to its least, above which its unit is that of their geometric mean.
 _WIDE = 3e3
@@ -715,14 +716,17 @@ def _column_of(
     sizes = np.abs(values)
     if not np.any(np.isfinite(sizes)):
         sizes = np.abs(np.append(errors[1], errors[2]))
-    finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
-    largest = finite.max(initial=0.0)
+    largest = sizes[np.isfinite(sizes)].max(initial=0.0)
+    is_rounding = sizes <= _ROUNDING * largest
+    finite = sizes[np.isfinite(sizes) & ~is_rounding]
     # in a unit of the largest value the least of a wide column would be nearly nothing
     if finite.size and largest > _WIDE * finite.min():
         largest = float(np.sqrt(largest * finite.min()))
     factor, shown = scaled(largest, unit)
     if unit == "%":
         factor, shown = 100.0, "%"
+    if sizes.shape == values.shape:
+        values = np.where(is_rounding, 0.0, values)
     texts = [
         bounded(
             factor * value,
