@@ -136,6 +136,9 @@ NO_MAXIMUM = (
 )
 NO_PEAK = "the value at an end of the run is as large"
 STAYS_CLOSED, NO_JUMP_IN = "the contact does not open", "no contact jumps in"
+OPEN_THROUGHOUT = "the contact is open throughout the run"
+#: Those of them that a contact which never closes does not have, because they are of a closed contact.
+OF_A_CONTACT = (STAYS_CLOSED, NO_JUMP_IN, NO_PEAK, NO_MAXIMUM)
 WITHOUT_TENSION = "the contact bears no tension"
 
 

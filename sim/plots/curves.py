@@ -420,6 +420,8 @@ _FINE = 3
 
 #: Least share of the area by which a line stands apart from a curve.
 _APART = 0.005
+#: Share of the area below which a loss is of rounding.
+_NOTHING = 1e-6
 
 
 #: Quantiles that an axis shows, of records whose whole range is larger by more than a factor.
@@ -566,7 +568,8 @@ def share_panel(panel: Axes, scene: Scene) -> None:
             "fluctuations": (bottom, top, style.FLUCTUATIONS),
         }
         for name, (low, high, colour) in mechanisms.items():
-            if scene.varies(f"lost_to_{name}"):
+            share = np.nan_to_num(scene.all(f"lost_to_{name}"))
+            if scene.varies(f"lost_to_{name}") and np.any(np.abs(share) > _NOTHING):
                 words = "lost to broken bonds" if name == "bonds" else f"lost to {name}"
                 look: Any = {"color": colour, "alpha": 0.35, "label": words}
                 style.fill(panel, x, low, high, **look)

@@ -5,6 +5,7 @@ A number of the scenario is a variable, a swept one a coordinate; the resolved s
 
 import contextlib
 import json
+import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -256,8 +257,13 @@ def lacking(dataset: xr.Dataset) -> str:
         is not None
     ):
         return ""
+    # without adhesion there is none to mask, in any version
+    has_none = dataset.get("adhesion_work", xr.DataArray(math.inf)) <= 0.0
+    beside = {"time_masked"} if bool(has_none.all()) else set()
     lost = [
-        words for name, words in _STATEMENTS.items() if name not in dataset.variables
+        words
+        for name, words in _STATEMENTS.items()
+        if name not in {*dataset.variables, *beside}
     ]
     version = str(dataset.attrs["sim_version"])
     if version.startswith(_FIRST):

@@ -5,7 +5,7 @@ import contextlib
 import numpy as np
 import xarray as xr
 
-from sim.quantities import QUANTITIES
+from sim.quantities import OF_A_CONTACT, OPEN_THROUGHOUT, QUANTITIES
 from sim.read.correlation import Array
 from sim.read.dataset import (
     MEMBERS,
@@ -19,7 +19,7 @@ from sim.read.dataset import (
 from sim.read.estimate import Estimate, Estimates, explained, of_every_member
 from sim.read.lifetimes import half_lives
 from sim.read.loops import mean_loops
-from sim.read.observables import defined
+from sim.read.observables import defined, is_open_throughout
 from sim.read.peaks import (
     ageing,
     ensemble_peaks,
@@ -104,7 +104,7 @@ def events(dataset: xr.Dataset) -> Estimates:
         found |= mean_loops(dataset)
     if {"pull_off_error", "pull_off_load"} <= {*dataset}:
         _add_step_errors(found, dataset)
-    return found
+    return _of_contacts(found, dataset)
 
 
 def _alone(variable: xr.DataArray) -> xr.DataArray:
@@ -131,7 +131,23 @@ def of_events(dataset: xr.Dataset, over: str = "") -> Estimates:
     for of_phases in filter(None, phased):
         means = summary(of_phases.assign_attrs(dataset.attrs), quantiles=False)
         result |= {f"phase_{name}": one for name, one in means.items()}
-    return explained(result | half_lives(dataset) | ensemble_peaks(dataset), over)
+    result |= half_lives(dataset) | ensemble_peaks(dataset)
+    return explained(_of_contacts(result, dataset), over)
+
+
+def _of_contacts(found: Estimates, dataset: xr.Dataset) -> Estimates:
+    """Return events without those of closed contacts at points of the sweep where no contact ever closes."""
+    is_open = is_open_throughout(dataset)
+    if not bool(is_open.any()):
+        return found
+    result = dict(found)
+    for name, one in found.items():
+        if name in QUANTITIES and QUANTITIES[name].absent in OF_A_CONTACT:
+            reason = "" if one.reason is None else one.reason
+            known = one._replace(reason=None).map(lambda each: each.where(~is_open))
+            reason = xr.where(is_open, OPEN_THROUGHOUT, reason)
+            result[name] = known._replace(reason=reason)
+    return result
 
 
 def _dissipated(dataset: xr.Dataset) -> Estimate:

@@ -152,6 +152,31 @@ def closed_only(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(result)
 
 
+def is_open_throughout(dataset: xr.Dataset) -> xr.DataArray:
+    """Return True at each point of the sweep at which no contact of any member is closed at any time of the run."""
+    dataset = plain(dataset)
+    result = xr.zeros_like(dataset["contact_modulus"], bool)
+    if "in_contact" not in dataset:
+        return result
+
+    def is_open(flags: xr.DataArray) -> xr.DataArray:
+        closed = ensemble_mean(flags) > 0.0
+        return ~closed.any([name for name in closed.dims if name not in result.dims])
+
+    closed = dataset["in_contact"]
+    result = result | is_open(closed.isel(t=0))
+    # most contacts are closed at the start, and all records take time to read
+    if not bool(result.any()):
+        return result
+    result = result & is_open(closed)
+    for name in ("first_closing", "first_closing_count"):
+        if name in dataset:
+            times = ensemble_mean(dataset[name])
+            counts = times.notnull() if name == "first_closing" else times
+            result = result & is_open(counts)
+    return result
+
+
 def with_slips(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset in which the speed of a driven slider on single bonds is its displacement over the time.
 

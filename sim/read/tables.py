@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.quantities import QUANTITIES, Definition, Form
+from sim.quantities import OPEN_THROUGHOUT, QUANTITIES, Definition, Form
 from sim.read.control_variate import control_variate, is_corrected
 from sim.read.correlation import WIDE, Array
 from sim.read.dataset import ensemble_mean, only_statistics
@@ -16,6 +16,7 @@ from sim.read.errors import systematic_errors
 from sim.read.estimate import Estimate, Estimates
 from sim.read.observables import restricted, with_slips
 from sim.read.over_speed import extremes
+from sim.read.peaks import PLACES
 from sim.read.run import Run
 from sim.read.slips import unresolved_slips
 from sim.read.statistics import QUANTILES, over_members
@@ -368,13 +369,22 @@ def _once(
         if name in one.dims
     }
     points = _points(sizes, _thinned(sizes, rows))
-    chosen = [column for column in columns if _says_something(stated, column, points)]
+    chosen = [
+        Column(_defined(column.definition, stated[column.name]), column.dull)
+        for column in columns
+        if _says_something(stated, column, points)
+    ]
     if not chosen:
         return Table([])
     kept, left_out = _fitting(chosen, most - len(points))
     return _table_of(places, stated, points, points, kept)._replace(
         total=math.prod(sizes.values()), left_out=left_out
     )
+
+
+def _defined(row: Definition, one: Estimate) -> Definition:
+    """Return the definition of a quantity with its meaning in this run, if that is another one than in the registry."""
+    return row._replace(meaning=str(one.value.attrs.get("definition", row.meaning)))
 
 
 def _fitting(
@@ -566,14 +576,15 @@ def key_figures(run: Run) -> list[dict[str, str]]:
         column = columns.get(name)
         if column is None:
             continue
-        row, about = column.definition, one.value.attrs
+        row, about = _defined(column.definition, one), one.value.attrs
         over = f"; mean over the {about['over']}" if about.get("over") else ""
         for place in np.ndindex(one.value.shape):
             at = dict(zip(one.value.dims, place, strict=True))
             here = one.isel(at)
             (reason,) = _reasons_at(here, {}, row)
-            # an event that did not happen is no key figure
-            if here.is_missing and reason in ("", row.absent):
+            # an event that did not happen is no key figure, nor is the place of a peak that is none
+            is_absent = reason in ("", row.absent, OPEN_THROUGHOUT) or name in PLACES
+            if here.is_missing and is_absent:
                 continue
             if abs(here.value - column.dull) < _ROUNDING:
                 continue

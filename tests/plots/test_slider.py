@@ -229,6 +229,24 @@ def test_only_a_loss_as_the_square_of_the_force_has_an_alpha_and_a_law(
         assert any(f"{alpha:.3g} mm$^2$/N$^2$" in name for name in names)
 
 
+@pytest.mark.parametrize(
+    "share_left",
+    [
+        lambda share: 1.0 + 0.02 * share - 0.1 * share**2,
+        lambda share: 1.0 - 0.1 * (np.exp(8.0 * share) - 1.0) / np.exp(8.0),
+    ],
+)
+def test_a_loss_that_no_power_of_the_force_describes_has_no_exponent(share_left):
+    """The first area grows before it falls, and the second falls faster than any power."""
+    dataset = pulled(2.0)
+    force, area = dataset["spring_force"], dataset["contact_area"]
+    left = area[0] * share_left(force / force.max())
+    dataset["contact_area"] = left.assign_attrs(area.attrs)
+    panel = rendered(draw(dataset, "incipient")).axes[0]
+    assert not [line for line in panel.lines if "Q" in str(line.get_label())]
+    assert len(lines_of(panel)) == 1
+
+
 def test_figures_of_a_slider_are_refused_with_the_cure_where_they_cannot_be_drawn():
     for kind, of, cure in (
         ("creep", "pull", "force"),
