@@ -324,7 +324,7 @@ def observables(
     ``area_ratio`` is A/A_JKR, with the JKR area for the same mount at that time. ``fraction_detached`` is 1 if the
     contact is open. ``fraction_masked`` is 1 if it is closed without effective work of adhesion (a Hertz contact).
     Their ensemble means are the fractions. Both are nan once the motion of the slider has ended in contact, although
-    the recorded flags stay.
+    the flag ``in_contact`` stays.
     """
     dataset = plain(dataset)
     result = dataset.drop_vars(
