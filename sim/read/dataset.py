@@ -442,6 +442,16 @@ def only_statistics(dataset: xr.Dataset) -> bool:
     return STATISTIC in dataset.dims
 
 
+def recorded_share(dataset: xr.Dataset, event: str) -> xr.DataArray | None:
+    """Return the share of the members that have had an event, if statistics over these members were recorded.
+
+    ``event`` is the name of its time, or of another number that only they have. None if members were recorded or agree.
+    """
+    if f"{event}_count" not in dataset:
+        return None
+    return dataset[f"{event}_count"] / float(dataset.attrs["members"])
+
+
 def speed_of(dataset: xr.Dataset) -> xr.DataArray:
     """Return the prescribed speed of the slider or of the stage, which is the same for all members [m/s]."""
     speed = ensemble_mean(dataset[speed_name(dataset)])

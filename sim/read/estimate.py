@@ -90,12 +90,18 @@ class Estimate(NamedTuple):
         return self._replace(value=value, reason=reason)
 
 
-def of_every_member(values: xr.DataArray, reason: str) -> Estimate:
-    """Return values of members; nan at points of the sweep where some members alone have one, with the reason."""
-    if MEMBERS not in values.dims:
+def of_every_member(
+    values: xr.DataArray, reason: str, share: xr.DataArray | None = None
+) -> Estimate:
+    """Return values of members; nan at points of the sweep where some members alone have one, with the reason.
+
+    Of recorded statistics over the members the ``share`` that has a value is needed.
+    """
+    if share is None and MEMBERS in values.dims:
+        share = values.notnull().mean(MEMBERS)
+    if share is None:
         return Estimate(values)
-    is_known = values.notnull()
-    of_all, of_some = is_known.all(MEMBERS), is_known.any(MEMBERS)
+    of_all, of_some = share == 1.0, share > 0.0
     reasons = xr.where(of_some & ~of_all, reason, "")
     return Estimate(values.where(of_all), reason=reasons)
 

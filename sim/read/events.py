@@ -14,12 +14,13 @@ from sim.read.dataset import (
     ensemble_mean,
     only_statistics,
     plain,
+    recorded_share,
     where_recorded,
 )
 from sim.read.estimate import Estimate, Estimates, explained, of_every_member
 from sim.read.lifetimes import half_lives
 from sim.read.loops import mean_loops
-from sim.read.observables import defined
+from sim.read.observables import defined, share_of_members
 from sim.read.peaks import (
     ageing,
     ensemble_peaks,
@@ -81,19 +82,17 @@ def events(dataset: xr.Dataset) -> Estimates:
         name: Estimate(_alone(dataset[name])) for name in _TURNS if name in dataset
     }
     for name, first in _EVER.items():
-        if f"{first}_count" in dataset:
-            share = dataset[f"{first}_count"] / dataset.attrs["members"]
-            found[name] = Estimate(defined(name, share))
+        share = share_of_members(dataset, first, name)
+        if share is not None:
+            found[name] = Estimate(share)
         elif first in dataset:
             has_had = dataset[first].notnull().astype(float)
             found[name] = Estimate(_alone(defined(name, has_had)))
     for name in ("pull_off_time", "jump_in_time"):
-        if f"{name}_count" in dataset:
-            is_of_all = dataset[f"{name}_count"] == dataset.attrs["members"]
-            found[name] = Estimate(found[name].value.where(is_of_all))
-        elif name in found:
+        if name in found:
             reason = f"{QUANTITIES[name].absent} in every member"
-            found[name] = of_every_member(found[name].value, reason)
+            share = recorded_share(dataset, name)
+            found[name] = of_every_member(found[name].value, reason, share)
     found |= _over_pull_offs(dataset)
     for part in (peaks, stick_slip, static_threshold, ageing):
         with where_recorded():

@@ -8,6 +8,7 @@ import contextlib
 import itertools
 import math
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,6 +23,7 @@ from sim.read.dataset import (
     ensemble_mean,
     only_statistics,
     plain,
+    recorded_share,
     setting,
     stays_held,
     where_recorded,
@@ -166,6 +168,22 @@ def with_slips(dataset: xr.Dataset) -> xr.Dataset:
     recorded = dataset["speed"]
     speed = with_mean(recorded, moved.where(later, ensemble_mean(recorded)))
     return dataset.assign(speed=speed.assign_attrs(recorded.attrs))
+
+
+def share_of_members(dataset: xr.Dataset, event: str, name: str) -> xr.DataArray | None:
+    """Return the statistics of a quantity that is 1 in members that have had an event and 0 in the others.
+
+    They follow from the recorded share of these members (``recorded_share``), without which they are None.
+    """
+    share = recorded_share(dataset, event)
+    if share is None:
+        return None
+    members = float(dataset.attrs["members"])
+    others = members - 1.0 if members > 1.0 else math.nan
+    spread = (share * (1.0 - share) * members / others) ** 0.5
+    moments = [share, spread, spread / members**0.5]
+    how: Any = {"coords": "minimal", "compat": "override"}
+    return defined(name, xr.concat(moments, dataset[STATISTIC], **how))
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
+from sim.quantities import QUANTITIES, Form
 from sim.read.control_variate import (
     ControlVariate,
     control_variate,
@@ -22,7 +23,13 @@ from sim.read.observables import closed_observables, is_of_contact, restricted
 FOR_TAILS = 20
 QUANTILES = (0.05, 0.5, 0.95)
 #: Observables that are 0 or 1 in each member: the interval of their mean is that of a share.
-_COUNTED = ("fraction_detached", "fraction_masked", "ever_detached")
+_COUNTED = (
+    "fraction_detached",
+    "fraction_masked",
+    "ever_detached",
+    "ever_masked",
+    "ran_away",
+)
 #: Forces and speeds below it are of rounding, by their units: a bond bears a million million times as much.
 _ROUNDING = {"N": 1e-24, "m/s": 1e-24}
 
@@ -130,7 +137,10 @@ def _moments(name: str, values: Array, count: Array) -> dict[str, Array]:
 def interval(
     name: str, mean: Array, sem: Array, count: Array | float
 ) -> tuple[Array, Array]:
-    """Return the ends of the 95 % interval of a mean over ``count`` members; nan for a single member."""
+    """Return the ends of the 95 % interval of a mean over ``count`` members; nan for a single member.
+
+    No end of a share is below 0 or above 1, because no mean of shares is.
+    """
     count = np.asarray(count, float)
     if name not in _COUNTED:
         half = (
@@ -139,7 +149,10 @@ def interval(
             )
             * sem
         )
-        return mean - half, mean + half
+        low, high = mean - half, mean + half
+        if name in QUANTITIES and QUANTITIES[name].form is Form.SHARE:
+            return np.maximum(low, 0.0), np.minimum(high, 1.0)
+        return low, high
     # time averages of the members count for more than one each
     with np.errstate(invalid="ignore", divide="ignore"):
         equivalent = np.where(sem > 0.0, mean * (1.0 - mean) / sem**2, 0.0)

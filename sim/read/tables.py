@@ -11,7 +11,7 @@ import xarray as xr
 from sim.quantities import QUANTITIES, Definition, Form
 from sim.read.control_variate import control_variate, is_corrected
 from sim.read.correlation import WIDE, Array
-from sim.read.dataset import ensemble_mean, only_statistics
+from sim.read.dataset import ensemble_mean, only_statistics, recorded_share
 from sim.read.errors import systematic_errors
 from sim.read.estimate import Estimate, Estimates
 from sim.read.observables import restricted, with_slips
@@ -468,10 +468,10 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         )
     if phrases:
         yield "; ".join(phrases)
-    if "runaway_time" in run.dataset and not only_statistics(run.dataset):
-        times = run.dataset["runaway_time"].isel(t=-1)
-        if count := int(times.notnull().sum()):
-            yield f"{count} of {times.size} trajectories end because the slider lost stability"
+    if "runaway_force" in run.dataset:
+        count, total = _trajectories(run.dataset, "runaway_force")
+        if count:
+            yield f"{count} of {total} trajectories end because the slider lost stability"
     if only_statistics(run.dataset) and run.losses:
         yield (
             "members were not recorded: errors of losses take those at neighbouring "
@@ -481,15 +481,21 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         yield sentence
 
 
+def _trajectories(dataset: xr.Dataset, event: str) -> tuple[int, int]:
+    """Return the number of trajectories that have had an event, by a number that only they have, and that of all."""
+    share = recorded_share(dataset, event)
+    if share is None:
+        values = dataset[event]
+        return int(values.notnull().sum()), values.size
+    members = int(dataset.attrs["members"])
+    return round(float(share.sum()) * members), share.size * members
+
+
 def unresolved(dataset: xr.Dataset) -> str:
     """Return a sentence on the trajectories whose motion was not resolved to the end, and its cure; "" without any."""
     if "unresolved_time" not in dataset:
         return ""
-    times = dataset["unresolved_time"]
-    count, total = int(times.notnull().sum()), times.size
-    if only_statistics(dataset):
-        numbers = dataset["unresolved_time_count"]
-        count, total = int(numbers.sum()), numbers.size * int(dataset.attrs["members"])
+    count, total = _trajectories(dataset, "unresolved_time")
     if not count:
         return ""
     return (

@@ -5,14 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.driven import LOAD, force, scenario
-from helpers.parts import Record, bonds, run, shear
-from numpy.testing import assert_array_equal
+from helpers.driven import LOAD, UNIT, force, scenario
+from helpers.parts import Record, bonds, read, run, shear
+from numpy.testing import assert_allclose, assert_array_equal
 
+from sim.read.statistics import interval
 from sim.spectrum.families import Ripple
 
-#: Members of a run and its length [s]: under the force every bond of each member breaks within a second or two.
-MEMBERS, LASTS, ABOVE = 6, 8.0, 0.5
+#: Members of a run and its length [s], and forces over that at the unit of stretch from which some members lose
+#: stability in it, and all of them in its first half.
+MEMBERS, LASTS, SOME, ABOVE = 6, 8.0, 0.08, 0.5
 #: A load that draws the sphere off after all motions have ended, and one that does so at once.
 LATE = {"time": [0.0, 0.5 * LASTS, LASTS], "value": [LOAD, LOAD, -LOAD]}
 EARLY = {"time": [0.0, 0.04, LASTS], "value": [LOAD, -2.0 * LOAD, -2.0 * LOAD]}
@@ -54,3 +56,39 @@ def test_no_event_of_the_contact_is_set_after_the_end_of_a_motion_and_each_is_th
     assert_array_equal(masked["first_masked"], 0.0)
     assert_array_equal(masked["time_masked"], 1.0)
     assert np.isfinite(masked["runaway_time"].isel(t=-1)).all()
+
+
+@pytest.fixture(scope="module")
+def swept():
+    """Runs at forces from which none, some and all of the members run away: of each member, and of statistics."""
+    scene, at = creeping(ABOVE), [1e-3 * UNIT, SOME * UNIT, ABOVE * UNIT]
+    scene = replace(scene, sweep={"drive.force": at})
+    return run(scene), run(replace(scene, record=Record(per_member=False)))
+
+
+def test_the_share_of_members_that_lost_stability_is_the_same_of_recorded_statistics(
+    swept,
+):
+    each, pooled = (read.Run(dataset).events for dataset in swept)
+    gone = swept[0]["runaway_time"].isel(t=-1).notnull().sum("member")
+    none, some, all_of_them = gone.values
+    assert none == 0 and 0 < some < MEMBERS and all_of_them == MEMBERS
+    for name in ("ran_away", "runaway_after", "static_friction"):
+        for field in ("value", "sem", "low", "high"):
+            of_each, of_pooled = (getattr(one[name], field) for one in (each, pooled))
+            assert_allclose(of_pooled, of_each, rtol=1e-9, atol=1e-30, err_msg=name)
+        if name != "ran_away":
+            assert_array_equal(pooled[name].reason, each[name].reason)
+            assert [bool(text) for text in each[name].reason.values] == [1, 1, 0]
+    assert_allclose(pooled["ran_away"].value, gone / MEMBERS, rtol=1e-14)
+    for dataset in swept:
+        notes = read.notes(read.Run(dataset), read.tables_of(read.Run(dataset))).needed
+        lines = [line for line in notes if "lost stability" in line and " of " in line]
+        assert any(line.startswith(f"{int(gone.sum())} of 18 ") for line in lines)
+
+
+@pytest.mark.parametrize("name", ["ran_away", "ever_masked", "time_masked"])
+def test_no_end_of_the_interval_of_a_share_is_below_none_or_above_all(name):
+    means, errors = np.array([0.0, 0.05, 0.95, 1.0]), np.array([0.0, 0.2, 0.2, 0.0])
+    low, high = interval(name, means, errors, 3)
+    assert np.all((low >= 0.0) & (low <= means) & (means <= high) & (high <= 1.0))
