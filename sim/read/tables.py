@@ -459,8 +459,12 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         phrases.append("brackets: standard error in the last digits")
     if any("±" in cell for cell in cells):
         phrases.append("±: bound of an error that members do not reduce")
-    if any(re.search(r"\(.* |\([<>]", cell.partition("±")[0]) for cell in cells):
+    if any(re.search(r"\([<>]\d", cell) for cell in cells):
         phrases.append("near 0 and 100 %: the end of the 95 % interval")
+    if any(re.search(r"\([<>] ", cell) for cell in cells):
+        phrases.append(
+            "< or > with a blank: the only end of the 95 % interval that is known"
+        )
     if any("free values" in row for each_table in shown for row in each_table.rows):
         sample = run.sample(late=True)
         phrases.append(
@@ -507,19 +511,22 @@ def unresolved(dataset: xr.Dataset) -> str:
 def _missing(shown: Sequence[Table]) -> Iterator[str]:
     """Yield the reasons of printed columns in which a number is missing or is no mean, each with its points.
 
-    Reasons that differ in their numbers only are one, with those of the first point.
+    Reasons of a column that differ in their numbers only are one, with those of the first point. Columns share a line
+    if text, numbers and points are the same.
     """
-    alike: dict[str, list[Reason]] = {}
+    alike: dict[tuple[str, str], list[Reason]] = {}
     for reason in (reason for each_table in shown for reason in each_table.reasons):
-        alike.setdefault(_NUMBER.sub("#", reason.text), []).append(reason)
-    for entries in alike.values():
-        affected = ", ".join(dict.fromkeys(reason.heading for reason in entries))
-        places = dict.fromkeys(reason.place for reason in entries)
-        first, *others = places
+        pattern = _NUMBER.sub("#", reason.text)
+        alike.setdefault((reason.heading, pattern), []).append(reason)
+    affected: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    for (heading, _), entries in alike.items():
+        places = tuple(dict.fromkeys(reason.place for reason in entries))
+        affected.setdefault((entries[0].text, places), []).append(heading)
+    for (text, (first, *others)), headings in affected.items():
         points = "points" if len(others) > 1 else "point"
         more = f", and {len(others)} more {points}" if others else ""
         at = f" (at {first}{more})" if first else ""
-        yield f"* {affected}: {entries[0].text}{at}"
+        yield f"* {', '.join(headings)}: {text}{at}"
 
 
 def _turning(run: Run) -> Iterator[str]:

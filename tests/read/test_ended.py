@@ -9,6 +9,7 @@ from helpers.driven import LOAD, UNIT, force, scenario
 from helpers.parts import Record, bonds, read, run, shear
 from numpy.testing import assert_allclose, assert_array_equal
 
+from sim.read import tables
 from sim.read.statistics import interval
 from sim.spectrum.families import Ripple
 
@@ -92,3 +93,58 @@ def test_no_end_of_the_interval_of_a_share_is_below_none_or_above_all(name):
     means, errors = np.array([0.0, 0.05, 0.95, 1.0]), np.array([0.0, 0.2, 0.2, 0.0])
     low, high = interval(name, means, errors, 3)
     assert np.all((low >= 0.0) & (low <= means) & (means <= high) & (high <= 1.0))
+
+
+def test_every_missing_cell_has_a_star_and_a_reason_after_the_end_of_a_motion(swept):
+    run_of_each = read.Run(swept[0])
+    shown = read.tables_of(run_of_each, show=["all"])
+    missing = 0
+    for table in shown:
+        for row in table.rows:
+            assert "–" not in row.values()
+            missing += sum(cell == "–*" for cell in row.values())
+        headings = {reason.heading for reason in table.reasons}
+        for name in (each for row in table.rows for each in row if row[each] == "–*"):
+            assert name.rpartition(" (")[0] in headings or name in headings
+    assert missing
+    assert "V" in {reason.heading for reason in shown[0].reasons}
+
+
+def test_every_column_that_may_miss_a_value_has_a_reason_in_the_registry():
+    # a share of all members and a time that states its own reason are never missing without one
+    known = {"ever_masked", "ever_detached", "ran_away", "correlation_time"}
+    columns = (*tables.MAIN, *tables.LOSSES, *tables.EVENTS, *tables.SLIPS)
+    for column in (*columns, *tables.PHASES):
+        assert column.definition.absent or column.name in known, column.name
+
+
+def test_a_note_has_the_numbers_of_each_column_that_it_names():
+    reasons = (
+        tables.Reason("N/N0", "not settled: 0.76 → 0.72", "F = 9 mN"),
+        tables.Reason("A/A_JKR", "not settled: 0.95 → 0.94", "F = 9 mN"),
+        tables.Reason("w", "the contact is open", "F = 12 mN"),
+        tables.Reason("a", "the contact is open", "F = 12 mN"),
+        tables.Reason("a", "the contact is open", "F = 16 mN"),
+        tables.Reason("F", "the contact is open", "F = 12 mN"),
+    )
+    dataset = run(scenario(1.0, 4, force(1e-3), members=1))
+    shown = tables.Table([{"a": "–*"}], reasons=reasons)
+    lines = read.notes(read.Run(dataset), [shown]).needed
+    assert [line for line in lines if line.startswith("*")] == [
+        "* N/N0: not settled: 0.76 → 0.72 (at F = 9 mN)",
+        "* A/A_JKR: not settled: 0.95 → 0.94 (at F = 9 mN)",
+        "* w, F: the contact is open (at F = 12 mN)",
+        "* a: the contact is open (at F = 12 mN, and 1 more point)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("cell", "ends", "others"),
+    [("772 (> 400)", 1, 0), ("17 (<60)", 0, 1), ("1.5(2)", 0, 0), ("100 (>61)", 0, 1)],
+)
+def test_each_kind_of_bracket_is_explained_if_it_is_printed(cell, ends, others):
+    dataset = run(scenario(1.0, 4, force(1e-3), members=1))
+    shown = tables.Table([{"value": cell}])
+    text = "; ".join(read.notes(read.Run(dataset), [shown]).needed)
+    assert text.count("the only end of the 95 %") == ends
+    assert text.count("near 0 and 100 %") == others
