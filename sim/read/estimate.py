@@ -35,6 +35,8 @@ class Estimate(NamedTuple):
         Plain mean over the members, if the value is that at the known mean of ΔΓ.
     bias : xarray.DataArray, optional
         Bound of the bias of such a value, nan where it is the plain mean.
+    members : xarray.DataArray, optional
+        Number of members that have a value, if members differ and it is known; over time the least of all records.
     """
 
     value: xr.DataArray
@@ -50,6 +52,7 @@ class Estimate(NamedTuple):
     reason: xr.DataArray | None = None
     plain: xr.DataArray | None = None
     bias: xr.DataArray | None = None
+    members: xr.DataArray | None = None
 
     @property
     def unit(self) -> str:

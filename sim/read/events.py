@@ -123,6 +123,9 @@ def of_events(dataset: xr.Dataset, over: str = "") -> Estimates:
         bound = found[name].bound
         if bound is not None and MEMBERS in bound.dims:
             bound = bound.mean(MEMBERS, keep_attrs=True)
+        share = recorded_share(dataset, name)
+        if share is not None:
+            one = one._replace(members=share * float(dataset.attrs["members"]))
         result[name] = one._replace(bound=bound, reason=found[name].reason)
     phased = [peaks_after_holds(dataset)]
     if {"phase_start", "slip_time"} <= {*dataset.variables} and dataset.sizes["slip"]:

@@ -18,7 +18,7 @@ from sim.read.observables import restricted, with_slips
 from sim.read.over_speed import extremes
 from sim.read.run import Run
 from sim.read.slips import unresolved_slips
-from sim.read.statistics import QUANTILES, over_members
+from sim.read.statistics import QUANTILES, over_members, with_a_value
 from sim.units import notebook
 from sim.units.notation import bounded, concise, engineering, scaled, share
 
@@ -73,6 +73,14 @@ class Reason(NamedTuple):
     place: str
 
 
+class Sample(NamedTuple):
+    """The sample of a column: its heading, the least number of members with a value in a row, and if it differs."""
+
+    heading: str
+    least: int
+    differs: bool
+
+
 class Table(NamedTuple):
     """A table for people: cells by heading, with the unit of the column in the heading.
 
@@ -90,6 +98,8 @@ class Table(NamedTuple):
         Columns that would make the table too wide.
     reasons : tuple of Reason
         Reasons of its cells that are missing or are no means.
+    samples : tuple of Sample
+        Samples of its columns, if the number of members is known.
     """
 
     rows: list[dict[str, str]]
@@ -98,6 +108,7 @@ class Table(NamedTuple):
     columns: tuple[Column, ...] = ()
     left_out: tuple[Column, ...] = ()
     reasons: tuple[Reason, ...] = ()
+    samples: tuple[Sample, ...] = ()
 
     def _repr_html_(self) -> str:
         return notebook.table(self.rows)
@@ -447,7 +458,14 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
     """Yield the sample of the means, the meaning of brackets, and trajectories that end early."""
     cells = [cell for t in shown for row in t.rows for cell in row.values()]
     phrases = []
-    if sample := run.sample(run.has_one_row_each):
+    fewer = _fewer(run, shown)
+
+    def sample_of(late: bool) -> str:
+        sample = run.sample(late)
+        some = bool(fewer) or run.loses_members
+        return with_a_value(sample, run.members) if some else sample
+
+    if sample := sample_of(run.has_one_row_each):
         phrases.append(f"mean over the {sample}")
     if any(is_corrected(column.name) for t in shown for column in t.columns) and (
         "energy_variation" in run.dataset and control_variate(run.dataset.isel(t=[0]))
@@ -466,12 +484,12 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
             "< or > with a blank: the only end of the 95 % interval that is known"
         )
     if any("free values" in row for each_table in shown for row in each_table.rows):
-        sample = run.sample(late=True)
         phrases.append(
-            f"by quantity: over the {sample}; free values: the effective number of independent values"
+            f"by quantity: over the {sample_of(late=True)}; free values: the effective number of independent values"
         )
     if phrases:
         yield "; ".join(phrases)
+    yield from fewer
     if "runaway_force" in run.dataset:
         count, total = _trajectories(run.dataset, "runaway_force")
         if count:
@@ -483,6 +501,20 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         )
     if sentence := unresolved(run.dataset):
         yield sentence
+
+
+def _fewer(run: Run, shown: Sequence[Table]) -> list[str]:
+    """Return sentences on the number of members with a value in the columns in which not all have one."""
+    alike: dict[tuple[int, bool], list[str]] = {}
+    for sample in (sample for each_table in shown for sample in each_table.samples):
+        if sample.least < run.members:
+            headings = alike.setdefault((sample.least, sample.differs), [])
+            headings.append(sample.heading)
+    return [
+        f"of the {run.members} members, {'at least ' * differs}{least} have a value of "
+        + ", ".join(dict.fromkeys(headings))
+        for (least, differs), headings in sorted(alike.items())
+    ]
 
 
 def _trajectories(dataset: xr.Dataset, event: str) -> tuple[int, int]:
@@ -579,7 +611,6 @@ def key_figures(run: Run) -> list[dict[str, str]]:
         if column is None:
             continue
         row, about = column.definition, one.value.attrs
-        over = f"; mean over the {about['over']}" if about.get("over") else ""
         for place in np.ndindex(one.value.shape):
             at = dict(zip(one.value.dims, place, strict=True))
             here = one.isel(at)
@@ -589,6 +620,10 @@ def key_figures(run: Run) -> list[dict[str, str]]:
                 continue
             if abs(here.value - column.dull) < _ROUNDING:
                 continue
+            sample = str(about.get("over", ""))
+            if here.members is not None and here.members < run.members:
+                sample = with_a_value(sample, run.members, int(here.members))
+            over = f"; mean over the {sample}" if sample else ""
             where = [
                 f"phase {here.value[dim].item()}"
                 if dim == "phase"
@@ -652,16 +687,26 @@ def _table_of(
     count = next(iter(points.values())).size if points else 1
     swept = {name: index for name, index in placed.items() if name != "t"}
     words = _in_words(places, swept, count)
-    reasons = []
+    reasons, samples = [], []
     for column in columns:
         row, one = column.definition, means[column.name]
+        counts = _at(one.members, points)[~np.isnan(_at(one.value, points))]
+        if np.isfinite(counts).any():
+            least, most = int(np.nanmin(counts)), int(np.nanmax(counts))
+            samples.append(Sample(row.heading, least, least < most))
         shown, texts = _texts_of(one, points, row)
         for number, reason in enumerate(_reasons_at(one, points, row)):
             if reason:
                 texts[number] += "*"
                 reasons.append(Reason(row.heading, reason, words[number]))
         cells[_headed(row.heading, shown)] = texts
-    return Table(_rows(cells), keys, columns=columns, reasons=tuple(reasons))
+    return Table(
+        _rows(cells),
+        keys,
+        columns=columns,
+        reasons=tuple(reasons),
+        samples=tuple(samples),
+    )
 
 
 def _in_words(places: Places, points: Points, count: int) -> list[str]:
@@ -795,7 +840,7 @@ def at_records(dataset: xr.Dataset, names: list[str]) -> Estimates:
             kind: applied.fillna(getattr(load, kind)).assign_attrs(load.value.attrs)
             for kind in ("value", "low", "high")
         }
-        result["normal_load"] = load._replace(**fields)
+        result["normal_load"] = load._replace(**fields, members=None)
     return result
 
 

@@ -4,11 +4,14 @@ import functools
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from helpers.driven import LOAD, UNIT, force, scenario
 from helpers.parts import Record, bonds, read, run, shear
 from numpy.testing import assert_allclose, assert_array_equal
 
+from sim.parts.drive import Steady
+from sim.plots import curves
 from sim.read import tables
 from sim.read.statistics import interval
 from sim.spectrum.families import Ripple
@@ -148,3 +151,62 @@ def test_each_kind_of_bracket_is_explained_if_it_is_printed(cell, ends, others):
     text = "; ".join(read.notes(read.Run(dataset), [shown]).needed)
     assert text.count("the only end of the 95 %") == ends
     assert text.count("near 0 and 100 %") == others
+
+
+def sentences(dataset, *shown):
+    """Notes on the sample of some tables of a run."""
+    run_of_it = read.Run(dataset)
+    return [
+        line
+        for line in read.notes(run_of_it, [make(run_of_it) for make in shown]).needed
+        if "members" in line
+    ]
+
+
+def test_a_mean_over_fewer_members_names_their_number_in_tables_and_csv_files(
+    swept, tmp_path
+):
+    each, pooled = swept
+    whole = each.isel(drive_force=[0])
+    assert not any(
+        "have a value" in line for line in sentences(whole, read.table, read.highlights)
+    )
+    some = each.isel(drive_force=[1])
+    left = int(some["slider_position"].isel(t=-1).notnull().sum())
+    lines = sentences(some, read.table)
+    assert "or those of them" in lines[0]
+    (line,) = (line for line in lines if line.startswith(f"of the {MEMBERS} members"))
+    assert f" {left} have a value of V, " in line
+    assert any("or those of them" in line for line in sentences(pooled, read.table))
+    read.to_long_csv(read.Run(some), tmp_path / "long.csv")
+    rows = pd.read_csv(tmp_path / "long.csv")
+    speeds = rows[rows["quantity"] == "speed"]
+    assert speeds["over"].iloc[0] == f"{MEMBERS} members"
+    assert f"{left} of the {MEMBERS} members" in speeds["over"].iloc[-1]
+
+
+def test_the_number_of_members_of_an_event_is_that_of_those_that_had_it():
+    early = {"time": [0.0, LASTS], "value": [LOAD, -0.9 * LOAD]}
+    scene = replace(creeping(1e-3, load=early), drive=Steady(speed=1e-9))
+    for per_member in (True, False):
+        dataset = run(replace(scene, record=Record(per_member=per_member)))
+        one = read.Run(dataset).events["pull_off_load"]
+        count = int(one.members)
+        assert 0 < count < MEMBERS
+        lines = sentences(dataset, read.highlights)
+        assert any(f" {count} have a value of pull-off load" in line for line in lines)
+
+
+def test_the_mean_of_a_figure_over_time_ends_with_the_first_motion_that_ends(swept):
+    for dataset in swept:
+        some = dataset.isel(drive_force=[1])
+        first = float(swept[0].isel(drive_force=1)["runaway_time"].isel(t=-1).min())
+        scene = curves.scene_along(some, "t")
+        assert "until the first of them ends" in scene.averaged
+        position = scene.values("slider_position", scene.lines[0])
+        assert_array_equal(np.isfinite(position), some["t"] < first)
+        calm = curves.scene_along(dataset.isel(drive_force=[0]), "t")
+        assert "ends" not in calm.averaged
+        assert np.isfinite(calm.values("slider_position", calm.lines[0])).all()
+        over = curves.scene_along(dataset, "drive_force")
+        assert "those of them that have a value" in over.averaged
