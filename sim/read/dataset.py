@@ -448,6 +448,36 @@ def only_statistics(dataset: xr.Dataset) -> bool:
     return STATISTIC in dataset.dims
 
 
+def recorded_share(dataset: xr.Dataset, event: str) -> xr.DataArray | None:
+    """Return the share of the members that have had an event, if statistics over these members were recorded.
+
+    ``event`` is the name of its time, or of another number that only they have. None if members were recorded or agree.
+    """
+    if f"{event}_count" not in dataset:
+        return None
+    return dataset[f"{event}_count"] / float(dataset.attrs["members"])
+
+
+def number_of_members(dataset: xr.Dataset) -> int:
+    """Return the number of members of a run whose members differ, recorded or not; 1 if they agree."""
+    differ = MEMBERS in dataset.sizes or only_statistics(dataset)
+    recorded = dataset.sizes.get(MEMBERS, dataset.attrs.get("members", 1))
+    return int(recorded) if differ else 1
+
+
+def all_go_on(dataset: xr.Dataset) -> xr.DataArray | None:
+    """True at records before the end of the first motion of all members; None if it is not known, or members agree.
+
+    At a point of the sweep at which a motion ends before the first record it is True throughout.
+    """
+    going = None
+    if STATISTIC in dataset.get("runaway_time", xr.DataArray(0.0)).dims:
+        going = ensemble_mean(dataset["runaway_time"]).isnull()
+    elif MEMBERS in dataset.get("slider_position", xr.DataArray(0.0)).dims:
+        going = dataset["slider_position"].notnull().all(MEMBERS)
+    return None if going is None else going | ~going.any("t")
+
+
 def speed_of(dataset: xr.Dataset) -> xr.DataArray:
     """Return the prescribed speed of the slider or of the stage, which is the same for all members [m/s]."""
     speed = ensemble_mean(dataset[speed_name(dataset)])

@@ -14,12 +14,13 @@ from sim.read.dataset import (
     ensemble_mean,
     only_statistics,
     plain,
+    recorded_share,
     where_recorded,
 )
 from sim.read.estimate import Estimate, Estimates, explained, of_every_member
 from sim.read.lifetimes import half_lives
 from sim.read.loops import mean_loops
-from sim.read.observables import defined, is_open_throughout
+from sim.read.observables import defined, is_open_throughout, share_of_members
 from sim.read.peaks import (
     ageing,
     ensemble_peaks,
@@ -81,19 +82,17 @@ def events(dataset: xr.Dataset) -> Estimates:
         name: Estimate(_alone(dataset[name])) for name in _TURNS if name in dataset
     }
     for name, first in _EVER.items():
-        if f"{first}_count" in dataset:
-            share = dataset[f"{first}_count"] / dataset.attrs["members"]
-            found[name] = Estimate(defined(name, share))
+        share = share_of_members(dataset, first, name)
+        if share is not None:
+            found[name] = Estimate(share)
         elif first in dataset:
             has_had = dataset[first].notnull().astype(float)
             found[name] = Estimate(_alone(defined(name, has_had)))
     for name in ("pull_off_time", "jump_in_time"):
-        if f"{name}_count" in dataset:
-            is_of_all = dataset[f"{name}_count"] == dataset.attrs["members"]
-            found[name] = Estimate(found[name].value.where(is_of_all))
-        elif name in found:
+        if name in found:
             reason = f"{QUANTITIES[name].absent} in every member"
-            found[name] = of_every_member(found[name].value, reason)
+            share = recorded_share(dataset, name)
+            found[name] = of_every_member(found[name].value, reason, share)
     found |= _over_pull_offs(dataset)
     for part in (peaks, stick_slip, static_threshold, ageing):
         with where_recorded():
@@ -124,6 +123,9 @@ def of_events(dataset: xr.Dataset, over: str = "") -> Estimates:
         bound = found[name].bound
         if bound is not None and MEMBERS in bound.dims:
             bound = bound.mean(MEMBERS, keep_attrs=True)
+        share = recorded_share(dataset, name)
+        if share is not None:
+            one = one._replace(members=share * float(dataset.attrs["members"]))
         result[name] = one._replace(bound=bound, reason=found[name].reason)
     phased = [peaks_after_holds(dataset)]
     if {"phase_start", "slip_time"} <= {*dataset.variables} and dataset.sizes["slip"]:

@@ -8,6 +8,7 @@ import contextlib
 import itertools
 import math
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,6 +23,7 @@ from sim.read.dataset import (
     ensemble_mean,
     only_statistics,
     plain,
+    recorded_share,
     setting,
     stays_held,
     where_recorded,
@@ -193,6 +195,22 @@ def with_slips(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(speed=speed.assign_attrs(recorded.attrs))
 
 
+def share_of_members(dataset: xr.Dataset, event: str, name: str) -> xr.DataArray | None:
+    """Return the statistics of a quantity that is 1 in members that have had an event and 0 in the others.
+
+    They follow from the recorded share of these members (``recorded_share``), without which they are None.
+    """
+    share = recorded_share(dataset, event)
+    if share is None:
+        return None
+    members = float(dataset.attrs["members"])
+    others = members - 1.0 if members > 1.0 else math.nan
+    spread = (share * (1.0 - share) * members / others) ** 0.5
+    moments = [share, spread, spread / members**0.5]
+    how: Any = {"coords": "minimal", "compat": "override"}
+    return defined(name, xr.concat(moments, dataset[STATISTIC], **how))
+
+
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
     """Return JKR's area at the full work of adhesion [m^2]; nan if that contact is open."""
     return np.pi * reference_radii(dataset)["radius_jkr"] ** 2
@@ -349,7 +367,7 @@ def observables(
     ``area_ratio`` is A/A_JKR, with the JKR area for the same mount at that time. ``fraction_detached`` is 1 if the
     contact is open. ``fraction_masked`` is 1 if it is closed without effective work of adhesion (a Hertz contact).
     Their ensemble means are the fractions. Both are nan once the motion of the slider has ended in contact, although
-    the recorded flags stay.
+    the flag ``in_contact`` stays.
     """
     dataset = plain(dataset)
     result = dataset.drop_vars(

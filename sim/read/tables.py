@@ -11,7 +11,7 @@ import xarray as xr
 from sim.quantities import OPEN_THROUGHOUT, QUANTITIES, Definition, Form
 from sim.read.control_variate import control_variate, is_corrected
 from sim.read.correlation import WIDE, Array
-from sim.read.dataset import ensemble_mean, only_statistics
+from sim.read.dataset import ensemble_mean, only_statistics, recorded_share
 from sim.read.errors import systematic_errors
 from sim.read.estimate import Estimate, Estimates
 from sim.read.observables import restricted, with_slips
@@ -19,7 +19,7 @@ from sim.read.over_speed import extremes
 from sim.read.peaks import PLACES
 from sim.read.run import Run
 from sim.read.slips import unresolved_slips
-from sim.read.statistics import QUANTILES, over_members
+from sim.read.statistics import QUANTILES, over_members, with_a_value
 from sim.units import notebook
 from sim.units.notation import bounded, concise, engineering, scaled, share
 
@@ -75,6 +75,14 @@ class Reason(NamedTuple):
     place: str
 
 
+class Sample(NamedTuple):
+    """The sample of a column: its heading, the least number of members with a value in a row, and if it differs."""
+
+    heading: str
+    least: int
+    differs: bool
+
+
 class Table(NamedTuple):
     """A table for people: cells by heading, with the unit of the column in the heading.
 
@@ -92,6 +100,8 @@ class Table(NamedTuple):
         Columns that would make the table too wide.
     reasons : tuple of Reason
         Reasons of its cells that are missing or are no means.
+    samples : tuple of Sample
+        Samples of its columns, if the number of members is known.
     """
 
     rows: list[dict[str, str]]
@@ -100,6 +110,7 @@ class Table(NamedTuple):
     columns: tuple[Column, ...] = ()
     left_out: tuple[Column, ...] = ()
     reasons: tuple[Reason, ...] = ()
+    samples: tuple[Sample, ...] = ()
 
     def _repr_html_(self) -> str:
         return notebook.table(self.rows)
@@ -458,7 +469,14 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
     """Yield the sample of the means, the meaning of brackets, and trajectories that end early."""
     cells = [cell for t in shown for row in t.rows for cell in row.values()]
     phrases = []
-    if sample := run.sample(run.has_one_row_each):
+    fewer = _fewer(run, shown)
+
+    def sample_of(late: bool) -> str:
+        sample = run.sample(late)
+        some = bool(fewer) or run.loses_members
+        return with_a_value(sample, run.members) if some else sample
+
+    if sample := sample_of(run.has_one_row_each):
         phrases.append(f"mean over the {sample}")
     if any(is_corrected(column.name) for t in shown for column in t.columns) and (
         "energy_variation" in run.dataset and control_variate(run.dataset.isel(t=[0]))
@@ -470,19 +488,23 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         phrases.append("brackets: standard error in the last digits")
     if any("±" in cell for cell in cells):
         phrases.append("±: bound of an error that members do not reduce")
-    if any(re.search(r"\(.* |\([<>]", cell.partition("±")[0]) for cell in cells):
+    if any(re.search(r"\([<>]\d", cell) for cell in cells):
         phrases.append("near 0 and 100 %: the end of the 95 % interval")
-    if any("free values" in row for each_table in shown for row in each_table.rows):
-        sample = run.sample(late=True)
+    if any(re.search(r"\([<>] ", cell) for cell in cells):
         phrases.append(
-            f"by quantity: over the {sample}; free values: the effective number of independent values"
+            "< or > with a blank: the only end of the 95 % interval that is known"
+        )
+    if any("free values" in row for each_table in shown for row in each_table.rows):
+        phrases.append(
+            f"by quantity: over the {sample_of(late=True)}; free values: the effective number of independent values"
         )
     if phrases:
         yield "; ".join(phrases)
-    if "runaway_time" in run.dataset and not only_statistics(run.dataset):
-        times = run.dataset["runaway_time"].isel(t=-1)
-        if count := int(times.notnull().sum()):
-            yield f"{count} of {times.size} trajectories end because the slider lost stability"
+    yield from fewer
+    if "runaway_force" in run.dataset:
+        count, total = _trajectories(run.dataset, "runaway_force")
+        if count:
+            yield f"{count} of {total} trajectories end because the slider lost stability"
     if only_statistics(run.dataset) and run.losses:
         yield (
             "members were not recorded: errors of losses take those at neighbouring "
@@ -492,15 +514,35 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         yield sentence
 
 
+def _fewer(run: Run, shown: Sequence[Table]) -> list[str]:
+    """Return sentences on the number of members with a value in the columns in which not all have one."""
+    alike: dict[tuple[int, bool], list[str]] = {}
+    for sample in (sample for each_table in shown for sample in each_table.samples):
+        if sample.least < run.members:
+            headings = alike.setdefault((sample.least, sample.differs), [])
+            headings.append(sample.heading)
+    return [
+        f"of the {run.members} members, {'at least ' * differs}{least} have a value of "
+        + ", ".join(dict.fromkeys(headings))
+        for (least, differs), headings in sorted(alike.items())
+    ]
+
+
+def _trajectories(dataset: xr.Dataset, event: str) -> tuple[int, int]:
+    """Return the number of trajectories that have had an event, by a number that only they have, and that of all."""
+    share = recorded_share(dataset, event)
+    if share is None:
+        values = dataset[event]
+        return int(values.notnull().sum()), values.size
+    members = int(dataset.attrs["members"])
+    return round(float(share.sum()) * members), share.size * members
+
+
 def unresolved(dataset: xr.Dataset) -> str:
     """Return a sentence on the trajectories whose motion was not resolved to the end, and its cure; "" without any."""
     if "unresolved_time" not in dataset:
         return ""
-    times = dataset["unresolved_time"]
-    count, total = int(times.notnull().sum()), times.size
-    if only_statistics(dataset):
-        numbers = dataset["unresolved_time_count"]
-        count, total = int(numbers.sum()), numbers.size * int(dataset.attrs["members"])
+    count, total = _trajectories(dataset, "unresolved_time")
     if not count:
         return ""
     return (
@@ -512,19 +554,22 @@ def unresolved(dataset: xr.Dataset) -> str:
 def _missing(shown: Sequence[Table]) -> Iterator[str]:
     """Yield the reasons of printed columns in which a number is missing or is no mean, each with its points.
 
-    Reasons that differ in their numbers only are one, with those of the first point.
+    Reasons of a column that differ in their numbers only are one, with those of the first point. Columns share a line
+    if text, numbers and points are the same.
     """
-    alike: dict[str, list[Reason]] = {}
+    alike: dict[tuple[str, str], list[Reason]] = {}
     for reason in (reason for each_table in shown for reason in each_table.reasons):
-        alike.setdefault(_NUMBER.sub("#", reason.text), []).append(reason)
-    for entries in alike.values():
-        affected = ", ".join(dict.fromkeys(reason.heading for reason in entries))
-        places = dict.fromkeys(reason.place for reason in entries)
-        first, *others = places
+        pattern = _NUMBER.sub("#", reason.text)
+        alike.setdefault((reason.heading, pattern), []).append(reason)
+    affected: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    for (heading, _), entries in alike.items():
+        places = tuple(dict.fromkeys(reason.place for reason in entries))
+        affected.setdefault((entries[0].text, places), []).append(heading)
+    for (text, (first, *others)), headings in affected.items():
         points = "points" if len(others) > 1 else "point"
         more = f", and {len(others)} more {points}" if others else ""
         at = f" (at {first}{more})" if first else ""
-        yield f"* {affected}: {entries[0].text}{at}"
+        yield f"* {', '.join(headings)}: {text}{at}"
 
 
 def _turning(run: Run) -> Iterator[str]:
@@ -577,7 +622,6 @@ def key_figures(run: Run) -> list[dict[str, str]]:
         if column is None:
             continue
         row, about = _defined(column.definition, one), one.value.attrs
-        over = f"; mean over the {about['over']}" if about.get("over") else ""
         for place in np.ndindex(one.value.shape):
             at = dict(zip(one.value.dims, place, strict=True))
             here = one.isel(at)
@@ -588,6 +632,10 @@ def key_figures(run: Run) -> list[dict[str, str]]:
                 continue
             if abs(here.value - column.dull) < _ROUNDING:
                 continue
+            sample = str(about.get("over", ""))
+            if here.members is not None and here.members < run.members:
+                sample = with_a_value(sample, run.members, int(here.members))
+            over = f"; mean over the {sample}" if sample else ""
             where = [
                 f"phase {here.value[dim].item()}"
                 if dim == "phase"
@@ -651,16 +699,26 @@ def _table_of(
     count = next(iter(points.values())).size if points else 1
     swept = {name: index for name, index in placed.items() if name != "t"}
     words = _in_words(places, swept, count)
-    reasons = []
+    reasons, samples = [], []
     for column in columns:
         row, one = column.definition, means[column.name]
+        counts = _at(one.members, points)[~np.isnan(_at(one.value, points))]
+        if np.isfinite(counts).any():
+            least, most = int(np.nanmin(counts)), int(np.nanmax(counts))
+            samples.append(Sample(row.heading, least, least < most))
         shown, texts = _texts_of(one, points, row)
         for number, reason in enumerate(_reasons_at(one, points, row)):
             if reason:
                 texts[number] += "*"
                 reasons.append(Reason(row.heading, reason, words[number]))
         cells[_headed(row.heading, shown)] = texts
-    return Table(_rows(cells), keys, columns=columns, reasons=tuple(reasons))
+    return Table(
+        _rows(cells),
+        keys,
+        columns=columns,
+        reasons=tuple(reasons),
+        samples=tuple(samples),
+    )
 
 
 def _in_words(places: Places, points: Points, count: int) -> list[str]:
@@ -797,7 +855,7 @@ def at_records(dataset: xr.Dataset, names: list[str]) -> Estimates:
             kind: applied.fillna(getattr(load, kind)).assign_attrs(load.value.attrs)
             for kind in ("value", "low", "high")
         }
-        result["normal_load"] = load._replace(**fields)
+        result["normal_load"] = load._replace(**fields, members=None)
     return result
 
 
