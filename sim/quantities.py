@@ -135,7 +135,12 @@ NO_MAXIMUM = (
     "stage slows down"
 )
 NO_PEAK = "the value at an end of the run is as large"
+NO_STAGE, NO_PHASE = "no stage pulls the slider", "the run has no such phase"
+NEVER_CLOSED = "the contact was never closed"
 STAYS_CLOSED, NO_JUMP_IN = "the contact does not open", "no contact jumps in"
+OPEN_THROUGHOUT = "the contact is open throughout the run"
+#: Those of them that a contact which never closes does not have, because they are of a closed contact.
+OF_A_CONTACT = (STAYS_CLOSED, NO_JUMP_IN, NO_PEAK, NO_MAXIMUM)
 WITHOUT_TENSION = "the contact bears no tension"
 
 
@@ -181,7 +186,7 @@ STATISTICS = ("mean", "standard deviation", "standard error")
 
 #: Quantities over time, read at each record.
 RECORDS: tuple[Definition, ...] = (
-    Definition("speed", "m/s", "sliding speed", symbol="V", heading="V"),
+    Definition("speed", "m/s", "sliding speed", symbol="V", heading="V", absent=ENDED),
     Definition(
         "slider_position", "m", "displacement of the slider", symbol="X", mean=Mean.NONE
     ),
@@ -191,9 +196,14 @@ RECORDS: tuple[Definition, ...] = (
         "number of bonds over that at rest",
         symbol="N/N_0",
         heading="N/N0",
+        absent=ENDED,
     ),
     Definition(
-        "shear_stress", "Pa", "mean shear stress at the interface", symbol="tau_0"
+        "shear_stress",
+        "Pa",
+        "mean shear stress at the interface",
+        symbol="tau_0",
+        absent=ENDED,
     ),
     Definition(
         "fluctuation_energy",
@@ -201,6 +211,7 @@ RECORDS: tuple[Definition, ...] = (
         "elastic energy of the shear-stress fluctuations per area",
         symbol="DeltaGamma",
         heading="ΔΓ",
+        absent=ENDED,
     ),
     Definition(
         "expected_energy",
@@ -215,6 +226,7 @@ RECORDS: tuple[Definition, ...] = (
         symbol="dE/dA",
         exists_when=ON_A_DISC,
         heading="edge",
+        absent=ENDED,
     ),
     Definition(
         "work_of_adhesion",
@@ -262,7 +274,12 @@ RECORDS: tuple[Definition, ...] = (
         "indentation", "m", "indentation of the sphere", symbol="delta", absent=OPEN
     ),
     Definition(
-        "displacement", "m", "displacement of the mount", symbol="Delta", heading="Δ"
+        "displacement",
+        "m",
+        "displacement of the mount",
+        symbol="Delta",
+        heading="Δ",
+        absent=OPEN,
     ),
     Definition(
         "friction_force",
@@ -294,6 +311,7 @@ RECORDS: tuple[Definition, ...] = (
         symbol="W",
         mean=Mean.NONE,
         heading="W",
+        absent=ENDED,
     ),
     Definition(
         "jkr_radius",
@@ -362,6 +380,7 @@ RECORDS: tuple[Definition, ...] = (
         symbol="V_s",
         exists_when=BEHIND_A_SPRING,
         heading="stage",
+        absent=f"{NO_STAGE}, or {ENDED}",
     ),
     Definition(
         "spring_force",
@@ -461,10 +480,7 @@ DERIVED: tuple[Definition, ...] = (
     Definition(
         "area_ratio",
         "1",
-        (
-            "contact area over the JKR area at the full work of adhesion, with a range "
-            "of adhesion over the area of such a contact"
-        ),
+        "contact area over that at the full work of adhesion",
         symbol="A/A_JKR",
         heading="A/A_JKR",
         form=Form.PERCENT,
@@ -754,7 +770,7 @@ OF_THE_RUN: tuple[Definition, ...] = (
         "share of the closed time in which the contact is masked",
         heading="masked, of the time",
         form=Form.SHARE,
-        absent="the contact was never closed",
+        absent=NEVER_CLOSED,
         exists_when=WITH_ADHESION,
     ),
     Definition(
@@ -859,6 +875,7 @@ OF_SLIPS: tuple[Definition, ...] = (
         ),
         exists_when=BEHIND_A_SPRING,
         heading="slips",
+        absent=NO_STAGE,
     ),
     Definition(
         "slow_fall_count",
@@ -1036,6 +1053,7 @@ OF_MEMBERS: tuple[Definition, ...] = (
         "1/s",
         "detachments per time in contact, of all members",
         heading="rate of detaching",
+        absent=NEVER_CLOSED,
     ),
     Definition(
         "ever_masked",
@@ -1062,8 +1080,8 @@ OF_MEMBERS: tuple[Definition, ...] = (
     Definition(
         "loop_energy",
         "J",
-        "work of the mount in a cycle, the closed integral of load over displacement",
-        heading="∮P dΔ, per cycle",
+        "work of the mount in a cycle, the integral of load over displacement",
+        heading="∫P dΔ, per cycle",
         absent="a cycle is not closed",
     ),
     Definition(
@@ -1179,7 +1197,9 @@ OF_MEMBERS: tuple[Definition, ...] = (
 
 #: Quantities of the slip events in a phase of the course of a stage.
 OF_PHASES: tuple[Definition, ...] = (
-    Definition("phase_start", "s", "start of the phase", heading="starts"),
+    Definition(
+        "phase_start", "s", "start of the phase", heading="starts", absent=NO_PHASE
+    ),
     Definition(
         "phase_time_held",
         "s",
@@ -1188,7 +1208,11 @@ OF_PHASES: tuple[Definition, ...] = (
         absent="there was no rest before",
     ),
     Definition(
-        "phase_slip_count", "1", "number of slip events in the phase", heading="slips"
+        "phase_slip_count",
+        "1",
+        "number of slip events in the phase",
+        heading="slips",
+        absent=NO_PHASE,
     ),
     Definition(
         "phase_peak_after_hold",

@@ -41,6 +41,8 @@ COMPUTED, SEARCHED = 12, 100
 _STEPS, _KEYS = 1000, 5
 #: Error of A/A_JKR and lag that need a sentence; share of masked or open contacts and points of the area that do not.
 _ERROR, _LAG, _NEVER, _NO_POINT = 0.01, 0.005, 1e-4, 0.05
+#: Members whose contacts are computed at the start of a run.
+_STARTED = 16
 #: Points along a side of a cell beyond which no more are proposed; wavelengths of a band over a correlation length.
 _MOST_POINTS, _BAND = 2**14, (0.8, 1.2)
 #: Relative change of bonds and stress in the derivative of the area; duration over that of a ramp that nothing delays.
@@ -205,12 +207,17 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
 
 
 def diagnosis(plan: Plan) -> list[str]:
-    """Return the expectations of a run in sentences: what masks its contacts, and what reduces their area."""
+    """Return the expectations of a run in sentences: what opens or masks its contacts, and what reduces their area.
+
+    Sentences on steady sliding are of those points of a sweep at which contacts are closed at some time.
+    """
     examined = places(len(plan.points), COMPUTED)
+    stay_open = [place for place in examined if _stays_open(plan, plan.points[place])]
+    opened = list(_open(plan, stay_open, examined))
     scenes = {
         place: plan.points[place]
         for place in examined
-        if not plan.points[place].fluctuations.passes
+        if not plan.points[place].fluctuations.passes and place not in stay_open
     }
     courses = {place: expected(scene) for place, scene in scenes.items()}
     closed = {
@@ -219,9 +226,10 @@ def diagnosis(plan: Plan) -> list[str]:
         if np.any(np.isfinite(course.area))
     }
     if not closed:
-        return []
+        return opened
     middle = plan.points[list(closed)[len(closed) // 2]]
     return [
+        *opened,
         *_stored(plan, closed),
         *_masked(plan, closed, examined),
         *_pulled_off(plan, closed, examined),
@@ -245,6 +253,26 @@ def _percents(shares: Iterable[float]) -> str:
         for value in (min(known), max(known))
     )
     return f"{' to '.join(dict.fromkeys(ends))} %"
+
+
+def _stays_open(plan: Plan, point: Scenario) -> bool:
+    """Return True if the first members of a run start with an open contact, and no mount closes it later."""
+    contact = point.contact
+    reach = contact.jump_in_distance(point.adhesion.work)
+    if reach > 0.0 or max(contact.course.extremes) >= 0.0:
+        return False
+    members = np.arange(min(plan.members, _STARTED))
+    state = point.stepper.start(MemberNoise.of(point.seed, members))
+    return bool(np.isnan(state.contact.radius).all())
+
+
+def _open(plan: Plan, opened: Sequence[int], examined: Sequence[int]) -> Iterator[str]:
+    """Yield a sentence on contacts that are open at the start of a run and stay open."""
+    if not opened:
+        return
+    text = f"open for the whole run {points_in_words(plan, opened, examined)}".rstrip()
+    few = f" (by the first {_STARTED} members)" * (plan.members > _STARTED)
+    yield f"{text}{few}: no contact is closed at the start, and the mount closes none"
 
 
 def _stored(plan: Plan, courses: Courses) -> Iterator[str]:

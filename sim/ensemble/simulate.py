@@ -348,12 +348,16 @@ def _late_sums(
 
 
 def _read(variable: Variable, point: Scenario, course: Trajectory) -> np.ndarray:
-    """Return a recorded quantity, nan once the motion of the slider has ended; a flag or a count stays."""
+    """Return a recorded quantity, nan once the motion of the slider has ended.
+
+    The flag ``in_contact`` and counts stay as they were. That of a masked contact does not, because its mean over the
+    members is the share of those in motion.
+    """
     values = variable.read(point, course)
     ends = (
         point.varies["drive"]
         and point.varies[variable.part]
-        and variable.definition.symbol
+        and (variable.definition.symbol or variable.name == "masked")
     )
     if not ends or variable.name == "runaway_time":
         return cast(np.ndarray, values)

@@ -658,6 +658,8 @@ def _follow(bonds, contacts, motion, traits, events):
             if rises[i, 1] == 0.0:
                 _rise(friction, rises, i)
         for i in range(len(pull)):
+            if math.isnan(_of(first, k, i)):  # the motion had ended before
+                continue
             area0, area1 = (
                 math.pi * _of(radii, k, i) ** 2,
                 math.pi * _of(radii, k + 1, i) ** 2,
@@ -671,6 +673,8 @@ def _follow(bonds, contacts, motion, traits, events):
                 _of(detached, k, i),
             )
             closed, was_closed = radius > 0.0, contact[i, _LAST] > 0.0
+            if math.isnan(_of(first, k, i)):  # the motion had ended before
+                continue
             if closed:
                 contact[i, _CLOSED] += step
             if (

@@ -16,6 +16,8 @@ from sim.read import Run, is_stationary, is_steady, setting, slips, sweep_dims
 from sim.read.correlation import Array
 from sim.read.dataset import (
     MEMBERS,
+    all_go_on,
+    number_of_members,
     only_statistics,
     reference_in_words,
     speed_name,
@@ -26,7 +28,7 @@ from sim.read.estimate import Estimate, Estimates
 from sim.read.events import jumps
 from sim.read.late import distribution
 from sim.read.over_speed import speed_dim
-from sim.read.statistics import FOR_TAILS, averaging, over_members
+from sim.read.statistics import FOR_TAILS, averaging, over_members, with_a_value
 
 #: Largest number of points of a curve that carry markers.
 _MARKED = 25
@@ -51,12 +53,14 @@ class Statistics:
     """Statistics over the members along time (``"t"``) or a dimension of the sweep, each computed when first read.
 
     Along the sweep they are means over the second half of a stationary run, else those of the last record, and whatever
-    has been ``stated`` beside.
+    has been ``stated`` beside. Along time those of members that differ end with the first motion that ends, because a
+    mean over the members that are left is another one.
     """
 
     def __init__(self, dataset: xr.Dataset, along: str) -> None:
         self.dataset, self.along = dataset, along
         self.late = along != "t" and is_stationary(dataset)
+        self.going = all_go_on(dataset)
         self._computed: dict[str, Estimate | None] = {}
         self.stated = Estimates()
 
@@ -70,7 +74,11 @@ class Statistics:
     def _of(self, name: str) -> Estimate | None:
         """Return the statistics of a quantity; None if it is not known."""
         if self.along == "t":
-            return over_members(self.dataset, [name]).get(name)
+            one = over_members(self.dataset, [name]).get(name)
+            if one is None or one.std is None or self.going is None:
+                return one
+            differs = bool((one.std > 0.0).any())
+            return one.map(lambda each: each.where(self.going)) if differs else one
         if self.late and (one := distribution(self.dataset, [name]).get(name)):
             return one
         one = over_members(self.dataset.isel(t=[-1]), [name]).get(name)
@@ -216,6 +224,9 @@ def scene_along(dataset: xr.Dataset, along: str) -> Scene:
     lines, left_out = _lines_of(dataset, dims)
     statistics = Statistics(dataset, along)
     words = averaging(dataset, statistics.late)
+    if statistics.going is not None and not bool(statistics.going.all()):
+        ended = with_a_value(words, number_of_members(dataset))
+        words = f"{words}, until the first of them ends" if along == "t" else ended
     if len(lines) == 1:
         lines = [lines[0]._replace(label=words or "simulated", colour=style.BOTH)]
     members = dataset.sizes.get(MEMBERS, 0)
@@ -420,6 +431,8 @@ _FINE = 3
 
 #: Least share of the area by which a line stands apart from a curve.
 _APART = 0.005
+#: Share of the area below which a loss is of rounding.
+_NOTHING = 1e-6
 
 
 #: Quantiles that an axis shows, of records whose whole range is larger by more than a factor.
@@ -566,7 +579,8 @@ def share_panel(panel: Axes, scene: Scene) -> None:
             "fluctuations": (bottom, top, style.FLUCTUATIONS),
         }
         for name, (low, high, colour) in mechanisms.items():
-            if scene.varies(f"lost_to_{name}"):
+            share = np.nan_to_num(scene.all(f"lost_to_{name}"))
+            if scene.varies(f"lost_to_{name}") and np.any(np.abs(share) > _NOTHING):
                 words = "lost to broken bonds" if name == "bonds" else f"lost to {name}"
                 look: Any = {"color": colour, "alpha": 0.35, "label": words}
                 style.fill(panel, x, low, high, **look)
@@ -765,7 +779,10 @@ def statement_figure(
         raise ValueError(f'{name} has no x axis "{x[:40]}"; choose a swept one: {axes}')
     stated = Run(scene.statistics.dataset).statements([name])
     scene.statistics.stated = stated
-    sample = stated[name].value.attrs["over"]
+    sample, counts = stated[name].value.attrs["over"], stated[name].members
+    members = number_of_members(dataset)
+    if counts is not None and bool((counts < members).any()):
+        sample = with_a_value(sample, members)
     words = f"mean over the {sample}, 95 % intervals" if sample else ""
     scene = scene._replace(heading="; ".join(filter(None, [words, scene.left_out])))
     panel = (2.2, lambda panel, scene: statement_curves(panel, scene, name))

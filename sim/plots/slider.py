@@ -55,13 +55,13 @@ def steady_law(
 ) -> np.ndarray:
     """Return shear stress [Pa] and bond fraction [1] of a scenario's bonds in steady sliding at speeds [m/s].
 
-    They are nan if the scenario cannot be read.
+    The stress has the sign of the speed. Both are nan if the scenario cannot be read.
     """
     scenario = scenario_at(dataset, point)
     if scenario is None:
         return np.full((2, speed.size), np.nan)
     steady = scenario.population.steady(speed)
-    return np.stack([steady.strength, steady.fraction])
+    return np.stack([np.copysign(steady.strength, speed), steady.fraction])
 
 
 # -- behind a spring, or under a force ----------------------------------------------------------
@@ -208,29 +208,40 @@ def needs_pull(dataset: xr.Dataset) -> None:
 
 #: Exponents of the loss of area by the tangential force that count as a square.
 _SQUARE = (1.7, 2.3)
+#: Records of which each half has a slope.
+_FEWEST = 4
 
 
 def exponent_of(force: np.ndarray, area: np.ndarray, top: int) -> float:
     """Return the exponent p of a loss of area [m^2] that grows as Q^p, up to half of the force at a record.
 
-    It is the slope of the logarithms of all records with a loss.
+    It is the slope of the logarithms. It is nan if no power describes the points: the area is not lost at each of them,
+    or the slopes at smaller and at larger forces differ by more than the exponents of a square may.
 
     >>> force = np.linspace(0.0, 1.0, 101)
     >>> round(exponent_of(force, 2.0 - 0.1 * force**1.5, 100), 3)
     1.5
+    >>> exponent_of(force, 2.0 + 0.1 * force - 0.3 * force**2, 100)
+    nan
     """
     loss = area[0] - area[:top]
-    small = (force[:top] <= 0.5 * force[top]) & (loss > 0.0) & (force[:top] > 0.0)
-    if np.sum(small) < 2:
+    small = (force[:top] <= 0.5 * force[top]) & (force[:top] > 0.0)
+    if np.sum(small) < _FEWEST or not np.all(loss[small] > 0.0):
         return np.nan
     share, lost = np.log(force[:top][small]), np.log(loss[small])
+    order = np.argsort(share)
+    halves = np.array_split(order, 2)
+    low, high = (np.polyfit(share[half], lost[half], 1)[0] for half in halves)
+    if not abs(high - low) <= _SQUARE[1] - _SQUARE[0]:
+        return np.nan
     return float(np.polyfit(share, lost, 1)[0])
 
 
 def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     """Contact area over the tangential force before sliding, and the law A0 − αQ² if the loss grows as a square.
 
-    Law and exponent are fitted by least squares up to half of the largest force. If the scenario has the table
+    Law and exponent are fitted by least squares up to half of the largest force, and an exponent is stated only if a
+    power of the force describes the loss there. If the scenario has the table
     ``[incipient]``, its empirical law and the theory of a sticking contact under a load are drawn instead.
     """
     scene = scene_along(dataset, "t")
@@ -248,7 +259,7 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
         force_of, area_of = force_of[: top + 1], area_of[: top + 1]
         known.append(unit.factor * force_of)
         scale = factor if absolute else 1.0 / area_of[0]
-        words = f"loss as $Q^{{{power:.2f}}}$"
+        words = f"loss as $Q^{{{power:.2f}}}$" if np.isfinite(power) else ""
         stated = _stated_laws(dataset, line.point, area_of[0], force_of)
         for look, name, areas in stated:
             look = look | {"color": line.colour, "linewidth": 0.9}
@@ -260,8 +271,8 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
             look = {} if scene.single else {"color": line.colour}
             panel.plot(known[-1], law, "--", **style.GREY | look)
             panel.plot([], [], "--", label=r"$A_0 - \alpha Q^2$", **style.GREY)
-        label = words if scene.single else f"{line.label}: {words}"
-        panel.plot(known[-1], scale * area_of, color=line.colour, label=label)
+        label = ": ".join(filter(None, ["" if scene.single else line.label, words]))
+        panel.plot(known[-1], scale * area_of, color=line.colour, label=label or None)
     forces = np.concatenate(known)
     style.across(panel, forces, unit.label("tangential force $Q$"))
     style.legend(panel, scene.title)

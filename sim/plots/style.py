@@ -17,8 +17,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.ticker import LogLocator, NullFormatter
 
@@ -279,14 +281,15 @@ def axis_scale(values: np.ndarray) -> str:
 
 
 def legend(panel: Axes, title: str = "", whole: bool = False) -> None:
-    """Draw a legend above a panel, each label once.
+    """Draw a legend above a panel, each label once and none of a line without a point.
 
     That of a ``whole`` figure, or of the first of panels in a column, belongs to the
     figure, so that a title of the panel has its place below it.
     """
     entries: dict[str, Any] = {}
     for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-        entries.setdefault(label, handle)
+        if _is_drawn(handle, panel.get_yscale() == "log"):
+            entries.setdefault(label, handle)
     if not entries and not title:
         return
     figure, spec = cast(Figure, panel.figure), panel.get_subplotspec()
@@ -304,6 +307,16 @@ def legend(panel: Axes, title: str = "", whole: bool = False) -> None:
     # of somebody else's figure, unless that has a layout that places no legends
     if type(figure.get_layout_engine()) in (type(None), ConstrainedLayoutEngine):
         figure.set_layout_engine(Layout())
+
+
+def _is_drawn(handle: Any, is_logarithmic: bool) -> bool:
+    """Return True unless all points of a line, or of one with error bars, are missing or have no logarithm."""
+    line = handle[0] if isinstance(handle, ErrorbarContainer) else handle
+    if not isinstance(line, Line2D) or not np.size(line.get_ydata()):
+        return True  # a sample of a look has no points
+    x, y = (np.asarray(each, float) for each in line.get_data())
+    is_shown = np.isfinite(x) & np.isfinite(y)
+    return bool(np.any(is_shown & ((y > 0.0) | (not is_logarithmic))))
 
 
 def head(figure: Figure, words: list[str]) -> None:
@@ -329,8 +342,10 @@ def fill(
 
 
 def upward(panel: Axes) -> None:
-    """Let the y axis be logarithmic if a line has anything above zero."""
-    if any(np.any(np.asarray(line.get_ydata()) > 0.0) for line in panel.lines):
+    """Let the y axis be logarithmic if each line that differs from zero has anything above it."""
+    lines = [np.nan_to_num(np.asarray(line.get_ydata(), float)) for line in panel.lines]
+    moving = [line for line in lines if np.any(line != 0.0)]
+    if moving and all(np.any(line > 0.0) for line in moving):
         panel.set_yscale("log")
 
 

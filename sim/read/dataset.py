@@ -5,6 +5,7 @@ A number of the scenario is a variable, a swept one a coordinate; the resolved s
 
 import contextlib
 import json
+import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -256,8 +257,13 @@ def lacking(dataset: xr.Dataset) -> str:
         is not None
     ):
         return ""
+    # without adhesion there is none to mask, in any version
+    has_none = dataset.get("adhesion_work", xr.DataArray(math.inf)) <= 0.0
+    beside = {"time_masked"} if bool(has_none.all()) else set()
     lost = [
-        words for name, words in _STATEMENTS.items() if name not in dataset.variables
+        words
+        for name, words in _STATEMENTS.items()
+        if name not in {*dataset.variables, *beside}
     ]
     version = str(dataset.attrs["sim_version"])
     if version.startswith(_FIRST):
@@ -440,6 +446,36 @@ def ensemble_mean(variable: xr.DataArray) -> xr.DataArray:
 def only_statistics(dataset: xr.Dataset) -> bool:
     """True if statistics over the members were recorded in place of these."""
     return STATISTIC in dataset.dims
+
+
+def recorded_share(dataset: xr.Dataset, event: str) -> xr.DataArray | None:
+    """Return the share of the members that have had an event, if statistics over these members were recorded.
+
+    ``event`` is the name of its time, or of another number that only they have. None if members were recorded or agree.
+    """
+    if f"{event}_count" not in dataset:
+        return None
+    return dataset[f"{event}_count"] / float(dataset.attrs["members"])
+
+
+def number_of_members(dataset: xr.Dataset) -> int:
+    """Return the number of members of a run whose members differ, recorded or not; 1 if they agree."""
+    differ = MEMBERS in dataset.sizes or only_statistics(dataset)
+    recorded = dataset.sizes.get(MEMBERS, dataset.attrs.get("members", 1))
+    return int(recorded) if differ else 1
+
+
+def all_go_on(dataset: xr.Dataset) -> xr.DataArray | None:
+    """True at records before the end of the first motion of all members; None if it is not known, or members agree.
+
+    At a point of the sweep at which a motion ends before the first record it is True throughout.
+    """
+    going = None
+    if STATISTIC in dataset.get("runaway_time", xr.DataArray(0.0)).dims:
+        going = ensemble_mean(dataset["runaway_time"]).isnull()
+    elif MEMBERS in dataset.get("slider_position", xr.DataArray(0.0)).dims:
+        going = dataset["slider_position"].notnull().all(MEMBERS)
+    return None if going is None else going | ~going.any("t")
 
 
 def speed_of(dataset: xr.Dataset) -> xr.DataArray:

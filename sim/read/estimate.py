@@ -35,6 +35,8 @@ class Estimate(NamedTuple):
         Plain mean over the members, if the value is that at the known mean of ΔΓ.
     bias : xarray.DataArray, optional
         Bound of the bias of such a value, nan where it is the plain mean.
+    members : xarray.DataArray, optional
+        Number of members that have a value, if members differ and it is known; over time the least of all records.
     """
 
     value: xr.DataArray
@@ -50,6 +52,7 @@ class Estimate(NamedTuple):
     reason: xr.DataArray | None = None
     plain: xr.DataArray | None = None
     bias: xr.DataArray | None = None
+    members: xr.DataArray | None = None
 
     @property
     def unit(self) -> str:
@@ -90,12 +93,18 @@ class Estimate(NamedTuple):
         return self._replace(value=value, reason=reason)
 
 
-def of_every_member(values: xr.DataArray, reason: str) -> Estimate:
-    """Return values of members; nan at points of the sweep where some members alone have one, with the reason."""
-    if MEMBERS not in values.dims:
+def of_every_member(
+    values: xr.DataArray, reason: str, share: xr.DataArray | None = None
+) -> Estimate:
+    """Return values of members; nan at points of the sweep where some members alone have one, with the reason.
+
+    Of recorded statistics over the members the ``share`` that has a value is needed.
+    """
+    if share is None and MEMBERS in values.dims:
+        share = values.notnull().mean(MEMBERS)
+    if share is None:
         return Estimate(values)
-    is_known = values.notnull()
-    of_all, of_some = is_known.all(MEMBERS), is_known.any(MEMBERS)
+    of_all, of_some = share == 1.0, share > 0.0
     reasons = xr.where(of_some & ~of_all, reason, "")
     return Estimate(values.where(of_all), reason=reasons)
 

@@ -5,7 +5,7 @@ import contextlib
 import numpy as np
 import xarray as xr
 
-from sim.quantities import QUANTITIES
+from sim.quantities import OF_A_CONTACT, OPEN_THROUGHOUT, QUANTITIES
 from sim.read.correlation import Array
 from sim.read.dataset import (
     MEMBERS,
@@ -14,12 +14,13 @@ from sim.read.dataset import (
     ensemble_mean,
     only_statistics,
     plain,
+    recorded_share,
     where_recorded,
 )
 from sim.read.estimate import Estimate, Estimates, explained, of_every_member
 from sim.read.lifetimes import half_lives
 from sim.read.loops import mean_loops
-from sim.read.observables import defined
+from sim.read.observables import defined, is_open_throughout, share_of_members
 from sim.read.peaks import (
     ageing,
     ensemble_peaks,
@@ -81,19 +82,17 @@ def events(dataset: xr.Dataset) -> Estimates:
         name: Estimate(_alone(dataset[name])) for name in _TURNS if name in dataset
     }
     for name, first in _EVER.items():
-        if f"{first}_count" in dataset:
-            share = dataset[f"{first}_count"] / dataset.attrs["members"]
-            found[name] = Estimate(defined(name, share))
+        share = share_of_members(dataset, first, name)
+        if share is not None:
+            found[name] = Estimate(share)
         elif first in dataset:
             has_had = dataset[first].notnull().astype(float)
             found[name] = Estimate(_alone(defined(name, has_had)))
     for name in ("pull_off_time", "jump_in_time"):
-        if f"{name}_count" in dataset:
-            is_of_all = dataset[f"{name}_count"] == dataset.attrs["members"]
-            found[name] = Estimate(found[name].value.where(is_of_all))
-        elif name in found:
+        if name in found:
             reason = f"{QUANTITIES[name].absent} in every member"
-            found[name] = of_every_member(found[name].value, reason)
+            share = recorded_share(dataset, name)
+            found[name] = of_every_member(found[name].value, reason, share)
     found |= _over_pull_offs(dataset)
     for part in (peaks, stick_slip, static_threshold, ageing):
         with where_recorded():
@@ -104,7 +103,7 @@ def events(dataset: xr.Dataset) -> Estimates:
         found |= mean_loops(dataset)
     if {"pull_off_error", "pull_off_load"} <= {*dataset}:
         _add_step_errors(found, dataset)
-    return found
+    return _of_contacts(found, dataset)
 
 
 def _alone(variable: xr.DataArray) -> xr.DataArray:
@@ -124,6 +123,9 @@ def of_events(dataset: xr.Dataset, over: str = "") -> Estimates:
         bound = found[name].bound
         if bound is not None and MEMBERS in bound.dims:
             bound = bound.mean(MEMBERS, keep_attrs=True)
+        share = recorded_share(dataset, name)
+        if share is not None:
+            one = one._replace(members=share * float(dataset.attrs["members"]))
         result[name] = one._replace(bound=bound, reason=found[name].reason)
     phased = [peaks_after_holds(dataset)]
     if {"phase_start", "slip_time"} <= {*dataset.variables} and dataset.sizes["slip"]:
@@ -131,7 +133,23 @@ def of_events(dataset: xr.Dataset, over: str = "") -> Estimates:
     for of_phases in filter(None, phased):
         means = summary(of_phases.assign_attrs(dataset.attrs), quantiles=False)
         result |= {f"phase_{name}": one for name, one in means.items()}
-    return explained(result | half_lives(dataset) | ensemble_peaks(dataset), over)
+    result |= half_lives(dataset) | ensemble_peaks(dataset)
+    return explained(_of_contacts(result, dataset), over)
+
+
+def _of_contacts(found: Estimates, dataset: xr.Dataset) -> Estimates:
+    """Return events without those of closed contacts at points of the sweep where no contact ever closes."""
+    is_open = is_open_throughout(dataset)
+    if not bool(is_open.any()):
+        return found
+    result = dict(found)
+    for name, one in found.items():
+        if name in QUANTITIES and QUANTITIES[name].absent in OF_A_CONTACT:
+            reason = "" if one.reason is None else one.reason
+            known = one._replace(reason=None).map(lambda each: each.where(~is_open))
+            reason = xr.where(is_open, OPEN_THROUGHOUT, reason)
+            result[name] = known._replace(reason=reason)
+    return result
 
 
 def _dissipated(dataset: xr.Dataset) -> Estimate:

@@ -17,7 +17,7 @@ from sim.read.dataset import steady_points
 from sim.read.estimate import Estimate
 from sim.read.observables import with_slips
 from sim.read.run import Run
-from sim.read.statistics import QUANTILES, over_members
+from sim.read.statistics import QUANTILES, over_members, with_a_value
 from sim.read.tables import (
     EVENTS,
     GROUPS,
@@ -272,6 +272,9 @@ def _long(run: Run) -> tuple[list[str], list[dict[str, Array]]]:
                 "source": one.source,
             }
             part = {column: np.array(text, object) for column, text in texts.items()}
+            if one.members is not None and {*one.members.dims} <= sizes.keys():
+                counts = one.members.variable.set_dims(sizes).to_numpy()
+                part["over"] = _samples_of(texts["over"], run.members, counts)
             for column, values in columns.items():
                 if {*values.dims} <= sizes.keys():
                     # an integer as a number that may be missing
@@ -280,6 +283,14 @@ def _long(run: Run) -> tuple[list[str], list[dict[str, Array]]]:
             parts.append(part)
     names = (*places, "speed", *_TEXTS, *_COLUMNS)
     return [name for name in names if any(name in part for part in parts)], parts
+
+
+def _samples_of(sample: str, members: int, counts: Array) -> Array:
+    """Return a sample in words for each number of members that have a value, of all ``members``."""
+    texts = np.full(counts.shape, sample, object)
+    for count in np.unique(counts[(counts > 0) & (counts < members)]):
+        texts[counts == count] = with_a_value(sample, members, int(count))
+    return texts
 
 
 def _statistics_of(one: Estimate) -> dict[str, xr.Variable]:

@@ -571,8 +571,22 @@ def _of_each(
         if control is not None and is_corrected(name) and MEMBERS in variables[0].dims:
             numbers |= _at_known_mean(numbers, values, control, sweep)
         variable = variables[0].rename(name)
-        result[name] = _described(variable, numbers, span, states, differ)
+        one = _described(variable, numbers, span, states, differ)
+        if MEMBERS in variable.dims:
+            least = _fewest(values).reshape(sweep.shape)
+            one = one._replace(members=xr.DataArray(least, sweep.coords, sweep.dims))
+        result[name] = one
     return result
+
+
+def _fewest(values: Array) -> Array:
+    """Return the least number of members with a value of all records that have any, at each point of a sweep.
+
+    ``values`` have the shape (points, members, records).
+    """
+    counts = np.isfinite(values).sum(axis=1)
+    fewest = np.where(counts > 0, counts, values.shape[1]).min(axis=-1)
+    return np.where(counts.any(axis=-1), fewest, 0)
 
 
 def _at_known_mean(

@@ -225,8 +225,8 @@ def half_lives(dataset: xr.Dataset) -> Estimates:
     dict of str to Estimate
         ``half_detached``, ``half_masked`` [s] and, of a stationary run, ``detached_rate``, ``masked_rate`` [1/s] with
         their 95 % intervals; see ``lifetime``. Members that are open from the start count from the time at which they
-        close, and never if they are never in contact. Empty where members do not differ. There is no time of an event
-        that no member has, nor of one that comes at a time of its own in a scene that changes.
+        close, and never if they are never in contact. Empty where members do not differ. There is no median time of an
+        event that no member has, nor of a single member; nor a rate in a scene that changes.
     """
     result = Estimates()
     happened = {"first_detachment": "detached", "first_masked": "masked"}
@@ -236,7 +236,7 @@ def half_lives(dataset: xr.Dataset) -> Estimates:
             continue
         times = dataset[event].astype(float)
         half, rate = lifetimes(dataset, times, name)
-        if bool(times.notnull().any()):
+        if bool(times.notnull().any()) and times.sizes[MEMBERS] > 1:
             result[f"half_{name}"] = half
         if is_at_rest:
             result[f"{name}_rate"] = rate

@@ -46,10 +46,11 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
 
     Notes
     -----
-    ``loop_energy`` is the closed integral of P dΔ with Δ the displacement of the base (the indentation,
-    where that or a load is prescribed), by the trapezoidal rule over the records. A jump between two records is
-    drawn as a straight line, so each costs up to half its load times the displacement of one record;
-    elsewhere the error falls with the square of the time between records.
+    ``loop_energy`` is the integral of P dΔ with Δ the displacement of the base (the indentation,
+    where that or a load is prescribed), which returns to its start. The load need not return,
+    because bonds and edges lag. The trapezoidal rule is used over the records. A jump between two
+    records is drawn as a straight line, so each costs up to half its load times the displacement of
+    one record; elsewhere the error falls with the square of the time between records.
 
     ``loop_dissipation`` is the growth of ``dissipated_energy``. Where the work of adhesion stays what it is and the
     contact follows equilibrium it is the whole loop: all the work is dissipated in jumps. With
@@ -103,7 +104,7 @@ def _loops(dataset: xr.Dataset, count: int) -> xr.Dataset:
     missing, *gained = (
         _growth(values, dataset["t"], ends).rename(end="cycle") for values in series
     )
-    texts = {"loop_energy": "closed integral of the load over the displacement"}
+    texts = {"loop_energy": "integral of the load over the displacement in a cycle"}
     texts["loop_dissipation"] = "energy dissipated by opening and closing"
     result = {}
     for (name, text), values in zip(texts.items(), gained, strict=True):

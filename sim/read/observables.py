@@ -8,6 +8,7 @@ import contextlib
 import itertools
 import math
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,6 +23,7 @@ from sim.read.dataset import (
     ensemble_mean,
     only_statistics,
     plain,
+    recorded_share,
     setting,
     stays_held,
     where_recorded,
@@ -152,6 +154,31 @@ def closed_only(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(result)
 
 
+def is_open_throughout(dataset: xr.Dataset) -> xr.DataArray:
+    """Return True at each point of the sweep at which no contact of any member is closed at any time of the run."""
+    dataset = plain(dataset)
+    result = xr.zeros_like(dataset["contact_modulus"], bool)
+    if "in_contact" not in dataset:
+        return result
+
+    def is_open(flags: xr.DataArray) -> xr.DataArray:
+        closed = ensemble_mean(flags) > 0.0
+        return ~closed.any([name for name in closed.dims if name not in result.dims])
+
+    closed = dataset["in_contact"]
+    result = result | is_open(closed.isel(t=0))
+    # most contacts are closed at the start, and all records take time to read
+    if not bool(result.any()):
+        return result
+    result = result & is_open(closed)
+    for name in ("first_closing", "first_closing_count"):
+        if name in dataset:
+            times = ensemble_mean(dataset[name])
+            counts = times.notnull() if name == "first_closing" else times
+            result = result & is_open(counts)
+    return result
+
+
 def with_slips(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset in which the speed of a driven slider on single bonds is its displacement over the time.
 
@@ -166,6 +193,22 @@ def with_slips(dataset: xr.Dataset) -> xr.Dataset:
     recorded = dataset["speed"]
     speed = with_mean(recorded, moved.where(later, ensemble_mean(recorded)))
     return dataset.assign(speed=speed.assign_attrs(recorded.attrs))
+
+
+def share_of_members(dataset: xr.Dataset, event: str, name: str) -> xr.DataArray | None:
+    """Return the statistics of a quantity that is 1 in members that have had an event and 0 in the others.
+
+    They follow from the recorded share of these members (``recorded_share``), without which they are None.
+    """
+    share = recorded_share(dataset, event)
+    if share is None:
+        return None
+    members = float(dataset.attrs["members"])
+    others = members - 1.0 if members > 1.0 else math.nan
+    spread = (share * (1.0 - share) * members / others) ** 0.5
+    moments = [share, spread, spread / members**0.5]
+    how: Any = {"coords": "minimal", "compat": "override"}
+    return defined(name, xr.concat(moments, dataset[STATISTIC], **how))
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
@@ -324,7 +367,7 @@ def observables(
     ``area_ratio`` is A/A_JKR, with the JKR area for the same mount at that time. ``fraction_detached`` is 1 if the
     contact is open. ``fraction_masked`` is 1 if it is closed without effective work of adhesion (a Hertz contact).
     Their ensemble means are the fractions. Both are nan once the motion of the slider has ended in contact, although
-    the recorded flags stay.
+    the flag ``in_contact`` stays.
     """
     dataset = plain(dataset)
     result = dataset.drop_vars(

@@ -62,12 +62,17 @@ _BEYOND = (
     "less is lost at the highest speed",
     "the contacts detach before this loss",
 )
+#: Reasons without a contact, and for a loss between rest and the lowest speed, or one that rest has already.
+_NO_CONTACT = "contacts are open, or open even at the full work of adhesion"
+_FROM_REST, _AT_REST = "less is lost at rest", "as much is lost at rest"
 #: Names of branches by the sign of the change of the speed.
 _WAYS = {1.0: "increasing speed", -1.0: "decreasing speed"}
 #: Causes of the bound of a speed: the larger part is of the interpolation, or of the clock step.
 _CAUSES = ("interpolation", "step")
 #: Relative lag of a speed below which it is not stated.
 _UNSEEN = 1e-3
+#: Share of JKR's area above which the area that must be left is all of it, within rounding.
+_WHOLE = 1.0 - 1e-9
 
 
 class Crossing(NamedTuple):
@@ -121,6 +126,9 @@ def crossing(
     half of them, less its noise. The interval ends at the next speeds that are above or below the level for sure,
     because the curve falls. If it reaches both, or a half ends there, these speeds are all that is known.
 
+    A speed of 0 has no logarithm. If rest has lost as much already, the loss has no speed. If the level is reached
+    within the noise alone, nothing is known above the speed at which it is first reached.
+
     Quantities ``beside`` are interpolated linearly over the fall, so shares of it add up to it; their errors are alike.
     """
     free = len(groups) - 1.0
@@ -128,17 +136,15 @@ def crossing(
     curves = np.stack([groups - level, *(beside if beside is not None else ())])
     nan, nothing = math.nan, np.full((len(curves) - 1, 5), math.nan)
     none = Crossing(nan, nan, nan, nan, nan, "", nothing)
-    highest = np.fmax.reduce(speeds)
-    speeds, order = np.unique(
-        np.where(np.isfinite(curves[0]).all(axis=0), speeds, 0.0), return_index=True
-    )
+    highest, weight = np.fmax.reduce(speeds), (sizes / sizes.sum())[:, np.newaxis]
+    is_closed = np.isfinite(curves[0]).all(axis=0)
+    at_rest = np.sum(weight * curves[0][:, is_closed & (speeds == 0.0)], axis=0)
+    speeds, order = np.unique(np.where(is_closed, speeds, 0.0), return_index=True)
     x, curves = np.log(speeds[speeds > 0.0]), curves[..., order[speeds > 0.0]]
     if not x.size:
-        here = "contacts are open, or open even at the full work of adhesion"
         return none._replace(
-            reason=here if highest > 0.0 else "the speed does not change here"
+            reason=_NO_CONTACT if highest > 0.0 else "the speed does not change here"
         )
-    weight = (sizes / sizes.sum())[:, np.newaxis]
     ends_early = bool(speeds[-1] < highest)
     whole = np.sum(weight * curves, axis=1, keepdims=True)
     if free:  # in the first row the mean, then those without each group
@@ -163,6 +169,8 @@ def crossing(
         return math.hypot(student * scatter, bound), scatter, bound
 
     mean, surely = whole[0, 0], max(_NEAR, student) * error(whole[0])
+    if mean[0] <= 0.0 and np.any(at_rest <= 0.0):
+        return none._replace(reason=_AT_REST)
     first = int(np.argmax(mean <= 0.0))
     far = np.flatnonzero(np.abs(mean) > surely[first])
     window = (
@@ -182,19 +190,21 @@ def crossing(
     k = int(np.argmax(rows[0] <= 0.0)) if np.any(rows[0] <= 0.0) else len(x)
     low = max(x[:k][rows[0, :k] > surely[:k]], default=math.nan)
     high = min(x[k:][rows[0, k:] < -surely[k:]], default=math.nan)
-    bracket = none._replace(
-        low=math.exp(low),
-        high=math.exp(high),
-        reason=f"known only between two of {count} speeds",
-    )
-    if math.isnan(low) and math.isnan(high):
-        bracket = bracket._replace(reason="hidden by the noise; add members")
+    falls = bool(np.any(mean <= 0.0))
+    if k == len(x) and falls:
+        # the level is reached in the noise, and nothing is known from there on
+        before = int(np.searchsorted(edges, first, side="right")) - 1
+        low = max(x[:before][rows[0, :before] > surely[:before]], default=math.nan)
+    reason = f"known only between two of {count} speeds"
+    if free and (math.isnan(low) or math.isnan(high)):
+        reason = "hidden by the noise; add members"
+    if k == 0 and mean[0] <= 0.0:
+        reason = _FROM_REST if at_rest.size else _BEYOND[0]
+    elif k == len(x) and not falls:
+        reason = _BEYOND[1 + ends_early]
+    bracket = none._replace(low=math.exp(low), high=math.exp(high), reason=reason)
     if not 2 <= k <= len(x) - 2:
-        return (
-            bracket._replace(reason=_BEYOND[k > 0 and 1 + ends_early])
-            if k in (0, len(x))
-            else bracket
-        )
+        return bracket
     near = slice(max(k - _REACH, 0), k + _REACH)
     x, whole, rows, k = x[near], whole[..., near], rows[:, near], k - near.start
     at = next(place for place in _places(x, rows[0], 0.0) if place >= x[k - 1])
@@ -485,7 +495,8 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
         ``branch``. If bonds lag behind a course, ``steady_speed_at_5_percent_lost`` is the speed at which steady
         sliding by the scenario's own models loses as much, nan where steady sliding is unstable behind the spring. With
         ``levels`` also the ``charges`` of that loss [1], such as ``lost_to_bonds_at_10_percent_lost``. Without
-        ``levels`` empty if there is no curve of the area over the speed.
+        ``levels`` empty if there is no curve of the area over the speed, no closed contact, or nothing to lose because
+        there is no adhesion.
 
     Notes
     -----
@@ -521,6 +532,9 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
     ]
     least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
+    can_lose = means["area_ratio"].notnull().any(["group", along]) & (least < _WHOLE)
+    if not wanted and not bool(can_lose.any()):
+        return {}
     lasting: Any = [None] * len(left)
     off = xr.zeros_like(speed)
     if along == "t":
@@ -546,7 +560,8 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
         *ends, why, others = xr.apply_ufunc(
             crossing, speed, means["area_ratio"], sizes, level, beside, **how
         )
-        is_known, never = ends[0].notnull(), ends[0].isnull() & (level < least)
+        # the loss of a share that is all there is takes an infinite speed
+        is_known, never = ends[0].notnull(), ends[0].isnull() & (level <= least)
         late = xr.apply_ufunc(_read_at, ends[0], speed, off, **at_a_speed)
         share = (late / ends[0]).fillna(0.0)
         ends[1], ends[2] = ends[1] * np.exp(-share), ends[2] * np.exp(share)
@@ -558,7 +573,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
         by_steps = bool((late > 0.5 * ends[4]).any())
         lag: list[Any] = [math.nan, True]
         if steady is not None:
-            lag = _lag(ends, steady[0], steady[1], speed)
+            lag = _lag(ends, steady[0].where(can_lose), steady[1], speed)
         for key, numbers in columns.items():
             stem, unit, source = str(key), "1", "interpolation"
             text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
@@ -572,7 +587,8 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
             low, high, error = (
                 each.where(~never & ~(is_known & alone)) for each in intervals
             )
-            further = [why, never, 100.0 * (1.0 - least), *lag, is_known & alone]
+            most = (100.0 * (1.0 - least)).clip(0.0)
+            further = [why, never, most, *lag, is_known & alone]
             reason = xr.apply_ufunc(
                 _in_words, *further, vectorize=True, output_dtypes=[object]
             )
@@ -594,11 +610,15 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
 def _without_delay(
     dataset: xr.Dataset, speed: xr.DataArray
 ) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return the speed that the bonds feel along a course, and by how much it may be off by the clock step."""
+    """Return the speed that the bonds feel along a course, and by how much it may be off by the clock step.
+
+    It is a speed of the course, because bonds have felt no other before the start.
+    """
     course = abs(speed_of(dataset))
     growth = course.differentiate("t") / course.where(course > 0.0)
     delay = of_course(dataset, abs(growth))
     earlier = speed * np.exp(-(growth * delay.time).fillna(0.0))
+    earlier = earlier.clip(speed.min("t"), speed.max("t"), keep_attrs=True)
     return earlier, (abs(growth) * earlier * delay.bound).fillna(0.0)
 
 

@@ -31,6 +31,8 @@ PEAKS = {
     "peak_stress": ("shear_stress", "peak"),
     "peak_friction": ("friction_force", "peak_friction"),
 }
+#: Times and speeds of peaks.
+PLACES = {f"{prefix}_{at}" for _, prefix in PEAKS.values() for at in ("time", "speed")}
 
 
 def differ(variable: xr.DataArray) -> bool:
@@ -49,11 +51,10 @@ def peaks(dataset: xr.Dataset) -> Estimates:
     Returns
     -------
     dict of str to Estimate
-        ``peak_stress`` [Pa], the largest magnitude of the shear stress while sliding; ``peak_time`` [s], from
-        where sliding starts; ``peak_speed`` [m/s]; and ``peak_friction`` [N], ``peak_friction_time`` and
-        ``peak_friction_speed``, the same of the friction force. Empty under any other drive, and of members that
-        differ: their largest value is that of the noise
-        (see ``ensemble_peaks``).
+        ``peak_stress`` [Pa], the maximum of the shear stress while sliding; ``peak_time`` [s], from where sliding
+        starts; ``peak_speed`` [m/s]; and ``peak_friction`` [N], ``peak_friction_time`` and ``peak_friction_speed``, the
+        same of the friction force. Empty under any other drive, and of members that differ: their largest value is that
+        of the noise (see ``ensemble_peaks``).
 
     Notes
     -----
@@ -96,7 +97,8 @@ def peaks(dataset: xr.Dataset) -> Estimates:
             speed = late.speed.where(ramp, speed)
             bounds = [late.time_bound, late.speed_bound]
         about = dataset[source].attrs
-        text = f"largest {about.get('long_name', source)} while sliding"
+        quantity = str(about.get("long_name", source)).partition(",")[0]
+        text = f"maximum of the {quantity} while sliding"
         unit = str(about.get("units", "1"))
         columns = {
             name: (size, None, unit, text),
@@ -340,7 +342,11 @@ _FEWEST = 8
 
 
 class Peak(NamedTuple):
-    """Peak of the mean of members, its standard error, time, and the ends of both intervals; or why there is none."""
+    """Peak of the mean of members, its time, and the ends of both intervals; or the reason why there is none.
+
+    ``sem`` and ``time_sem`` are the standard errors of both over the members. ``bound`` is that of the rise of the mean
+    between two records.
+    """
 
     reason: str
     value: float = math.nan
@@ -350,6 +356,8 @@ class Peak(NamedTuple):
     time: float = math.nan
     first: float = math.nan
     last: float = math.nan
+    bound: float = math.nan
+    time_sem: float = math.nan
 
 
 def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
@@ -422,16 +430,15 @@ def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
         / members
         @ values
     )
-    ends = np.quantile(
-        [_top(each, width, last)[1] for each in drawn],
-        [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL],
-    )
+    places = [_top(each, width, last)[1] for each in drawn]
+    ends = np.quantile(places, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
     value, sem, records_at = float(weights @ mean), error(weights), np.arange(records)
     half = float(special.stdtrit(free, 0.5 + 0.5 * LEVEL)) * sem
     between = max(
         0.0, 0.125 * float(np.array([-1.0, 2.0, -1.0]) @ mean[place - 1 : place + 2])
     ) * (width < 2)
     time, first, stop = np.interp([at, ends[0] - 0.5, ends[1] + 0.5], records_at, times)
+    time_sem = float(np.std(places)) * float(times[1] - times[0])
     return Peak(
         "",
         value,
@@ -441,6 +448,8 @@ def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
         float(time),
         float(first),
         float(stop),
+        between,
+        time_sem,
     )
 
 
@@ -476,7 +485,8 @@ def ensemble_peaks(dataset: xr.Dataset) -> Estimates:
     dict of str to Estimate
         ``peak_stress`` [Pa] and ``peak_friction`` [N], with a reason without a peak, see ``peak_of_mean``; time since
         sliding starts, ``peak_time`` and ``peak_friction_time`` [s], and speed then, ``peak_speed`` and
-        ``peak_friction_speed`` [m/s], with intervals. Empty under any other drive, and of members that do not differ.
+        ``peak_friction_speed`` [m/s], with standard errors, bounds and intervals. The bounds are of the time between
+        two records, and along a ramp of the clock step. Empty under any other drive, and of members that do not differ.
         Peaks of friction are of the contacts that stay closed.
     """
     dataset = plain(dataset)
@@ -492,57 +502,80 @@ def ensemble_peaks(dataset: xr.Dataset) -> Estimates:
     times, sweep = dataset["t"], xr.zeros_like(dataset["contact_modulus"], float)
     onset = (times >= rest - 1e-6 * times[-1]).argmax("t")
     speeds = abs(speed_of(dataset)) + sweep
-    for name, (source, prefix) in PEAKS.items():
-        if source not in dataset or not differ(dataset[source]):
+    for name, (quantity, prefix) in PEAKS.items():
+        if quantity not in dataset or not differ(dataset[quantity]):
             continue
-        about = dataset[source].attrs
-        unit = str(about.get("units", "1"))
+        unit = str(dataset[quantity].attrs.get("units", "1"))
         values = xr.DataArray(np.empty((0, times.size)), dims=_EACH)
-        if MEMBERS in dataset[source].dims:
-            values = observable_of(dataset, source)
+        if MEMBERS in dataset[quantity].dims:
+            values = observable_of(dataset, quantity)
         how: Any = {
             "input_core_dims": [_EACH, ["t"], [], ["t"]],
-            "output_core_dims": [[]] * 11,
+            "output_core_dims": [[]] * 16,
             "vectorize": True,
-            "output_dtypes": [object, *"dddddddddd"],
+            "output_dtypes": [object, *"d" * 15],
             "kwargs": {"unit": unit},
         }
-        reason, value, sem, low, high, *places = xr.apply_ufunc(
+        reason, value, sem, low, high, bound, *places = xr.apply_ufunc(
             _peak_since, values, speeds, onset, times, **how
         )
-        when, at = places[:3], places[3:]
+        # of each the value, the ends of its interval, the standard error, and the bound by the records
+        (*when, when_bound), (*at, at_bound) = places[:5], places[5:]
+        source = "records"
         if bool(is_ramp.any()):
             late = _late_by_steps(dataset, when[0], at[0])
             share = (late.speed / at[0]).where(is_ramp, 1.0)
-            when = [each - late.time.where(is_ramp, 0.0) for each in when]
-            at = [each * share for each in at]
-        text = f"peak of the mean of the {source.replace('_', ' ')}"
+            later = late.time.where(is_ramp, 0.0)
+            when[:3] = [each - later for each in when[:3]]
+            at[:3] = [each * share for each in at[:3]]
+            when_bound = when_bound + late.time_bound.where(is_ramp, 0.0)
+            at_bound = at_bound + late.speed_bound.where(is_ramp, 0.0)
+            source = "records and step"
+        text = f"peak of the mean of the {quantity.replace('_', ' ')} over the members"
         reason = reason.drop_attrs(deep=False)
-        value = labelled(value, unit, text)
-        result[name] = Estimate(value, sem, low, high, reason=reason)
-        for kind, (middle, first, last), si, words in (
-            ("time", when, "s", f"time of sliding to the {text}"),
-            ("speed", at, "m/s", f"speed at the {text}"),
-        ):
-            middle = labelled(middle, si, words)
-            result[f"{prefix}_{kind}"] = Estimate(middle, low=first, high=last)
+        found = (
+            (name, (value, low, high, sem), bound, "records", unit, text),
+            (
+                f"{prefix}_time",
+                when,
+                when_bound,
+                source,
+                "s",
+                f"time of sliding to the {text}",
+            ),
+            (f"{prefix}_speed", at, at_bound, source, "m/s", f"speed at the {text}"),
+        )
+        for key, numbers, off, cause, si, words in found:
+            middle, first, last, scatter = numbers
+            middle = labelled(middle, si, words).assign_attrs(definition=words)
+            off = off.assign_attrs(source=cause)
+            result[key] = Estimate(middle, scatter, first, last, off, reason=reason)
     return result
 
 
 def _peak_since(
     values: Array, speeds: Array, first: int, times: Array, unit: str
 ) -> tuple[Any, ...]:
-    """Return the fields of the ``Peak`` of the members after a record, and the speed at its time and interval."""
-    if not len(values):
-        return *Peak(
-            "the peak of members with noise needs every member: [record] per_member = true"
-        ), *[math.nan] * 3
+    """Return the numbers of the ``Peak`` of the members after a record, of its time, and of the speed then.
+
+    Time and speed have the ends of their intervals, a standard error, and a bound by the records.
+    """
     known, since = np.abs(values[:, first:]), times[first:] - times[first]
     known = known[np.isfinite(known).all(axis=-1)]
-    is_enough = len(known) > 1 and known.shape[1] >= _FEWEST
-    peak = (
-        peak_of_mean(known, since, unit)
-        if is_enough
-        else Peak("too few records or members")
-    )
-    return *peak, *np.interp(peak[-3:], since, speeds[first:])
+    if not len(values):
+        cure = "[record] per_member = true"
+        peak = Peak(f"the peak of members with noise needs every member: {cure}")
+    elif len(known) < 2 and len(values) > 1:
+        peak = Peak("fewer than two contacts stay closed")
+    elif len(known) < 2 or known.shape[1] < _FEWEST:
+        few = "members" if len(known) < 2 else "records"
+        peak = Peak(f"there are too few {few}")
+    else:
+        peak = peak_of_mean(known, since, unit)
+    half = 0.5 * float(since[1] - since[0]) if since.size > 1 else 0.0
+    place = peak.time, peak.first, peak.last
+    offs = [off for each in (peak.time_sem, half) for off in (-each, each)]
+    at = np.interp([*place, *(peak.time + off for off in offs)], since, speeds[first:])
+    time = *place, peak.time_sem, half
+    speed = *at[:3], *(0.5 * abs(at[4::2] - at[3::2]))
+    return *peak[:5], peak.bound, *time, *speed

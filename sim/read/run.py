@@ -117,6 +117,20 @@ class Run:
         return MEMBERS in self.dataset.sizes
 
     @cached_property
+    def members(self) -> int:
+        """The number of members if they differ, recorded or not; 1 if they agree."""
+        return datasets.number_of_members(self.dataset)
+
+    @cached_property
+    def loses_members(self) -> bool:
+        """True if members were not recorded, and some of them ended or opened before the end of the run."""
+        shares = (
+            datasets.recorded_share(self.dataset, event)
+            for event in ("runaway_force", "unresolved_time", "first_detachment")
+        )
+        return any(share is not None and bool((share > 0.0).any()) for share in shares)
+
+    @cached_property
     def drive(self) -> set[str]:
         """The models of the drive in the sweep."""
         words = datasets.word(self.dataset, "drive.model", "")

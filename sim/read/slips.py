@@ -11,12 +11,13 @@ from sim.read.dataset import (
     ensemble_mean,
     is_stationary,
     only_statistics,
+    recorded_share,
     setting,
     speed_of,
     word,
 )
 from sim.read.estimate import Estimate, Estimates, of_every_member
-from sim.read.observables import defined, labelled
+from sim.read.observables import defined, labelled, share_of_members
 from sim.read.statistics import summary
 
 #: Path of the stage in a clock step over the advance in a slip event, above which the event is not resolved.
@@ -281,7 +282,7 @@ def runaways(dataset: xr.Dataset) -> Estimates:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim run`` writes it, of a drive ``force`` with each member recorded.
+        As ``sim run`` writes it, of a drive ``force``.
 
     Returns
     -------
@@ -291,12 +292,15 @@ def runaways(dataset: xr.Dataset) -> Estimates:
         with the length of the run.
     """
     when = dataset["runaway_time"].isel(t=-1, drop=True).astype(float)
-    has_gone = when.notnull()
+    has_gone = share_of_members(dataset, "runaway_force", "ran_away")
+    if has_gone is None:
+        has_gone = defined("ran_away", when.notnull().astype(float))
     after = defined("runaway_after", when)
     force = defined("static_friction", dataset["runaway_force"].astype(float))
     reason = "not every member loses stability"
+    share = recorded_share(dataset, "runaway_force")
     return {
-        "ran_away": Estimate(defined("ran_away", has_gone.astype(float))),
-        "runaway_after": of_every_member(after, reason),
-        "static_friction": of_every_member(force, reason),
+        "ran_away": Estimate(has_gone),
+        "runaway_after": of_every_member(after, reason, share),
+        "static_friction": of_every_member(force, reason, share),
     }

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
+from sim.quantities import QUANTITIES, Form
 from sim.read.control_variate import (
     ControlVariate,
     control_variate,
@@ -14,7 +15,13 @@ from sim.read.control_variate import (
     is_corrected,
 )
 from sim.read.correlation import LEVEL, WIDE, Array
-from sim.read.dataset import MEMBERS, STATISTIC, ensemble_mean, only_statistics, pieces
+from sim.read.dataset import (
+    MEMBERS,
+    STATISTIC,
+    ensemble_mean,
+    number_of_members,
+    pieces,
+)
 from sim.read.estimate import Estimate, Estimates, joined
 from sim.read.observables import closed_observables, is_of_contact, restricted
 
@@ -22,7 +29,13 @@ from sim.read.observables import closed_observables, is_of_contact, restricted
 FOR_TAILS = 20
 QUANTILES = (0.05, 0.5, 0.95)
 #: Observables that are 0 or 1 in each member: the interval of their mean is that of a share.
-_COUNTED = ("fraction_detached", "fraction_masked", "ever_detached")
+_COUNTED = (
+    "fraction_detached",
+    "fraction_masked",
+    "ever_detached",
+    "ever_masked",
+    "ran_away",
+)
 #: Forces and speeds below it are of rounding, by their units: a bond bears a million million times as much.
 _ROUNDING = {"N": 1e-24, "m/s": 1e-24}
 
@@ -30,10 +43,23 @@ _ROUNDING = {"N": 1e-24, "m/s": 1e-24}
 def averaging(dataset: xr.Dataset, late: bool) -> str:
     """Return in words the sample of a mean: the second half of the run if ``late``, and members that differ."""
     over = ["second half of the run"] if late and dataset.sizes["t"] > 2 else []
-    members = dataset.sizes.get(MEMBERS, dataset.attrs.get("members", 1))
-    differ = MEMBERS in dataset.sizes or only_statistics(dataset)
-    over += [f"{members} members"] if differ and members > 1 else []
+    members = number_of_members(dataset)
+    over += [f"{members} members"] if members > 1 else []
     return f"mean over the {' and '.join(over)}" if over else ""
+
+
+def with_a_value(sample: str, members: int, count: int | None = None) -> str:
+    """Return a sample in words of which ``count`` of all ``members`` have a value, or some of them.
+
+    >>> print(with_a_value("second half of the run and 8 members", 8, 5))
+    second half of the run and 5 of the 8 members, those that have a value
+    >>> print(with_a_value("8 members", 8))
+    8 members, or those of them that have a value
+    """
+    words = f"{members} members"
+    if count is None:
+        return sample.replace(words, f"{words}, or those of them that have a value")
+    return sample.replace(words, f"{count} of the {words}, those that have a value")
 
 
 def summary(observables: xr.Dataset, quantiles: bool = True) -> Estimates:
@@ -84,14 +110,15 @@ def _recorded(statistics: xr.DataArray, observables: xr.Dataset) -> Estimate:
         STATISTIC, errors="ignore"
     )
     count: Any = float(observables.attrs.get("members", 1))
+    members = None
     if is_of_contact(str(statistics.name)) and "fraction_detached" in observables:
         closed = 1.0 - ensemble_mean(observables["fraction_detached"])
         count = np.rint(count * closed).broadcast_like(value).transpose(*value.dims)
-        count = count.to_numpy()
+        members, count = value.copy(data=count), count.to_numpy()
     name = str(statistics.name)
     low, high = interval(name, value.to_numpy(), sem.to_numpy(), count)
     ends = value.copy(data=low), value.copy(data=high)
-    return Estimate(value, sem, *ends, std=std)
+    return Estimate(value, sem, *ends, std=std, members=members)
 
 
 def _over_members(values: xr.DataArray, quantiles: bool) -> Estimate:
@@ -111,7 +138,7 @@ def _over_members(values: xr.DataArray, quantiles: bool) -> Estimate:
             kind: levels.copy(data=data)
             for kind, data in _quantiles(rows, count).items()
         }
-    return Estimate(**arrays)
+    return Estimate(**arrays, members=first_member.copy(data=count))
 
 
 def _moments(name: str, values: Array, count: Array) -> dict[str, Array]:
@@ -130,7 +157,10 @@ def _moments(name: str, values: Array, count: Array) -> dict[str, Array]:
 def interval(
     name: str, mean: Array, sem: Array, count: Array | float
 ) -> tuple[Array, Array]:
-    """Return the ends of the 95 % interval of a mean over ``count`` members; nan for a single member."""
+    """Return the ends of the 95 % interval of a mean over ``count`` members; nan for a single member.
+
+    No end of a share is below 0 or above 1, because no mean of shares is.
+    """
     count = np.asarray(count, float)
     if name not in _COUNTED:
         half = (
@@ -139,7 +169,10 @@ def interval(
             )
             * sem
         )
-        return mean - half, mean + half
+        low, high = mean - half, mean + half
+        if name in QUANTITIES and QUANTITIES[name].form is Form.SHARE:
+            return np.maximum(low, 0.0), np.minimum(high, 1.0)
+        return low, high
     # time averages of the members count for more than one each
     with np.errstate(invalid="ignore", divide="ignore"):
         equivalent = np.where(sem > 0.0, mean * (1.0 - mean) / sem**2, 0.0)

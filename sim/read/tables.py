@@ -8,17 +8,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.quantities import QUANTITIES, Definition, Form
+from sim.quantities import OPEN_THROUGHOUT, QUANTITIES, Definition, Form
 from sim.read.control_variate import control_variate, is_corrected
 from sim.read.correlation import WIDE, Array
-from sim.read.dataset import ensemble_mean, only_statistics
+from sim.read.dataset import ensemble_mean, only_statistics, recorded_share
 from sim.read.errors import systematic_errors
 from sim.read.estimate import Estimate, Estimates
 from sim.read.observables import restricted, with_slips
 from sim.read.over_speed import extremes
+from sim.read.peaks import PLACES
 from sim.read.run import Run
 from sim.read.slips import unresolved_slips
-from sim.read.statistics import QUANTILES, over_members
+from sim.read.statistics import QUANTILES, over_members, with_a_value
 from sim.units import notebook
 from sim.units.notation import bounded, concise, engineering, scaled, share
 
@@ -32,7 +33,8 @@ Places = Mapping[Any, xr.DataArray]
 MOST = 10
 #: Values of a sweep from which on an extreme inside is worth a note.
 _TURNS = 3
-#: Shares below it are nothing; spread over the mean below which a motion without noise has settled.
+#: Shares, and values over the largest of a column, below which they are of rounding; spread over the mean below
+#: which a motion without noise has settled.
 _ROUNDING, _SETTLED = 1e-13, 1e-3
 #: Ratio of the largest value of a column to its least, above which its unit is that of their geometric mean.
 _WIDE = 3e3
@@ -73,6 +75,14 @@ class Reason(NamedTuple):
     place: str
 
 
+class Sample(NamedTuple):
+    """The sample of a column: its heading, the least number of members with a value in a row, and if it differs."""
+
+    heading: str
+    least: int
+    differs: bool
+
+
 class Table(NamedTuple):
     """A table for people: cells by heading, with the unit of the column in the heading.
 
@@ -90,6 +100,8 @@ class Table(NamedTuple):
         Columns that would make the table too wide.
     reasons : tuple of Reason
         Reasons of its cells that are missing or are no means.
+    samples : tuple of Sample
+        Samples of its columns, if the number of members is known.
     """
 
     rows: list[dict[str, str]]
@@ -98,6 +110,7 @@ class Table(NamedTuple):
     columns: tuple[Column, ...] = ()
     left_out: tuple[Column, ...] = ()
     reasons: tuple[Reason, ...] = ()
+    samples: tuple[Sample, ...] = ()
 
     def _repr_html_(self) -> str:
         return notebook.table(self.rows)
@@ -367,13 +380,22 @@ def _once(
         if name in one.dims
     }
     points = _points(sizes, _thinned(sizes, rows))
-    chosen = [column for column in columns if _says_something(stated, column, points)]
+    chosen = [
+        Column(_defined(column.definition, stated[column.name]), column.dull)
+        for column in columns
+        if _says_something(stated, column, points)
+    ]
     if not chosen:
         return Table([])
     kept, left_out = _fitting(chosen, most - len(points))
     return _table_of(places, stated, points, points, kept)._replace(
         total=math.prod(sizes.values()), left_out=left_out
     )
+
+
+def _defined(row: Definition, one: Estimate) -> Definition:
+    """Return the definition of a quantity with its meaning in this run, if that is another one than in the registry."""
+    return row._replace(meaning=str(one.value.attrs.get("definition", row.meaning)))
 
 
 def _fitting(
@@ -447,7 +469,14 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
     """Yield the sample of the means, the meaning of brackets, and trajectories that end early."""
     cells = [cell for t in shown for row in t.rows for cell in row.values()]
     phrases = []
-    if sample := run.sample(run.has_one_row_each):
+    fewer = _fewer(run, shown)
+
+    def sample_of(late: bool) -> str:
+        sample = run.sample(late)
+        some = bool(fewer) or run.loses_members
+        return with_a_value(sample, run.members) if some else sample
+
+    if sample := sample_of(run.has_one_row_each):
         phrases.append(f"mean over the {sample}")
     if any(is_corrected(column.name) for t in shown for column in t.columns) and (
         "energy_variation" in run.dataset and control_variate(run.dataset.isel(t=[0]))
@@ -459,19 +488,23 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         phrases.append("brackets: standard error in the last digits")
     if any("±" in cell for cell in cells):
         phrases.append("±: bound of an error that members do not reduce")
-    if any(re.search(r"\(.* |\([<>]", cell.partition("±")[0]) for cell in cells):
+    if any(re.search(r"\([<>]\d", cell) for cell in cells):
         phrases.append("near 0 and 100 %: the end of the 95 % interval")
-    if any("free values" in row for each_table in shown for row in each_table.rows):
-        sample = run.sample(late=True)
+    if any(re.search(r"\([<>] ", cell) for cell in cells):
         phrases.append(
-            f"by quantity: over the {sample}; free values: the effective number of independent values"
+            "< or > with a blank: the only end of the 95 % interval that is known"
+        )
+    if any("free values" in row for each_table in shown for row in each_table.rows):
+        phrases.append(
+            f"by quantity: over the {sample_of(late=True)}; free values: the effective number of independent values"
         )
     if phrases:
         yield "; ".join(phrases)
-    if "runaway_time" in run.dataset and not only_statistics(run.dataset):
-        times = run.dataset["runaway_time"].isel(t=-1)
-        if count := int(times.notnull().sum()):
-            yield f"{count} of {times.size} trajectories end because the slider lost stability"
+    yield from fewer
+    if "runaway_force" in run.dataset:
+        count, total = _trajectories(run.dataset, "runaway_force")
+        if count:
+            yield f"{count} of {total} trajectories end because the slider lost stability"
     if only_statistics(run.dataset) and run.losses:
         yield (
             "members were not recorded: errors of losses take those at neighbouring "
@@ -481,15 +514,35 @@ def _samples(run: Run, shown: Sequence[Table]) -> Iterator[str]:
         yield sentence
 
 
+def _fewer(run: Run, shown: Sequence[Table]) -> list[str]:
+    """Return sentences on the number of members with a value in the columns in which not all have one."""
+    alike: dict[tuple[int, bool], list[str]] = {}
+    for sample in (sample for each_table in shown for sample in each_table.samples):
+        if sample.least < run.members:
+            headings = alike.setdefault((sample.least, sample.differs), [])
+            headings.append(sample.heading)
+    return [
+        f"of the {run.members} members, {'at least ' * differs}{least} have a value of "
+        + ", ".join(dict.fromkeys(headings))
+        for (least, differs), headings in sorted(alike.items())
+    ]
+
+
+def _trajectories(dataset: xr.Dataset, event: str) -> tuple[int, int]:
+    """Return the number of trajectories that have had an event, by a number that only they have, and that of all."""
+    share = recorded_share(dataset, event)
+    if share is None:
+        values = dataset[event]
+        return int(values.notnull().sum()), values.size
+    members = int(dataset.attrs["members"])
+    return round(float(share.sum()) * members), share.size * members
+
+
 def unresolved(dataset: xr.Dataset) -> str:
     """Return a sentence on the trajectories whose motion was not resolved to the end, and its cure; "" without any."""
     if "unresolved_time" not in dataset:
         return ""
-    times = dataset["unresolved_time"]
-    count, total = int(times.notnull().sum()), times.size
-    if only_statistics(dataset):
-        numbers = dataset["unresolved_time_count"]
-        count, total = int(numbers.sum()), numbers.size * int(dataset.attrs["members"])
+    count, total = _trajectories(dataset, "unresolved_time")
     if not count:
         return ""
     return (
@@ -501,19 +554,22 @@ def unresolved(dataset: xr.Dataset) -> str:
 def _missing(shown: Sequence[Table]) -> Iterator[str]:
     """Yield the reasons of printed columns in which a number is missing or is no mean, each with its points.
 
-    Reasons that differ in their numbers only are one, with those of the first point.
+    Reasons of a column that differ in their numbers only are one, with those of the first point. Columns share a line
+    if text, numbers and points are the same.
     """
-    alike: dict[str, list[Reason]] = {}
+    alike: dict[tuple[str, str], list[Reason]] = {}
     for reason in (reason for each_table in shown for reason in each_table.reasons):
-        alike.setdefault(_NUMBER.sub("#", reason.text), []).append(reason)
-    for entries in alike.values():
-        affected = ", ".join(dict.fromkeys(reason.heading for reason in entries))
-        places = dict.fromkeys(reason.place for reason in entries)
-        first, *others = places
+        pattern = _NUMBER.sub("#", reason.text)
+        alike.setdefault((reason.heading, pattern), []).append(reason)
+    affected: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    for (heading, _), entries in alike.items():
+        places = tuple(dict.fromkeys(reason.place for reason in entries))
+        affected.setdefault((entries[0].text, places), []).append(heading)
+    for (text, (first, *others)), headings in affected.items():
         points = "points" if len(others) > 1 else "point"
         more = f", and {len(others)} more {points}" if others else ""
         at = f" (at {first}{more})" if first else ""
-        yield f"* {affected}: {entries[0].text}{at}"
+        yield f"* {', '.join(headings)}: {text}{at}"
 
 
 def _turning(run: Run) -> Iterator[str]:
@@ -565,17 +621,21 @@ def key_figures(run: Run) -> list[dict[str, str]]:
         column = columns.get(name)
         if column is None:
             continue
-        row, about = column.definition, one.value.attrs
-        over = f"; mean over the {about['over']}" if about.get("over") else ""
+        row, about = _defined(column.definition, one), one.value.attrs
         for place in np.ndindex(one.value.shape):
             at = dict(zip(one.value.dims, place, strict=True))
             here = one.isel(at)
             (reason,) = _reasons_at(here, {}, row)
-            # an event that did not happen is no key figure
-            if here.is_missing and reason in ("", row.absent):
+            # an event that did not happen is no key figure, nor is the place of a peak that is none
+            is_absent = reason in ("", row.absent, OPEN_THROUGHOUT) or name in PLACES
+            if here.is_missing and is_absent:
                 continue
             if abs(here.value - column.dull) < _ROUNDING:
                 continue
+            sample = str(about.get("over", ""))
+            if here.members is not None and here.members < run.members:
+                sample = with_a_value(sample, run.members, int(here.members))
+            over = f"; mean over the {sample}" if sample else ""
             where = [
                 f"phase {here.value[dim].item()}"
                 if dim == "phase"
@@ -639,16 +699,26 @@ def _table_of(
     count = next(iter(points.values())).size if points else 1
     swept = {name: index for name, index in placed.items() if name != "t"}
     words = _in_words(places, swept, count)
-    reasons = []
+    reasons, samples = [], []
     for column in columns:
         row, one = column.definition, means[column.name]
+        counts = _at(one.members, points)[~np.isnan(_at(one.value, points))]
+        if np.isfinite(counts).any():
+            least, most = int(np.nanmin(counts)), int(np.nanmax(counts))
+            samples.append(Sample(row.heading, least, least < most))
         shown, texts = _texts_of(one, points, row)
         for number, reason in enumerate(_reasons_at(one, points, row)):
             if reason:
                 texts[number] += "*"
                 reasons.append(Reason(row.heading, reason, words[number]))
         cells[_headed(row.heading, shown)] = texts
-    return Table(_rows(cells), keys, columns=columns, reasons=tuple(reasons))
+    return Table(
+        _rows(cells),
+        keys,
+        columns=columns,
+        reasons=tuple(reasons),
+        samples=tuple(samples),
+    )
 
 
 def _in_words(places: Places, points: Points, count: int) -> list[str]:
@@ -715,14 +785,17 @@ def _column_of(
     sizes = np.abs(values)
     if not np.any(np.isfinite(sizes)):
         sizes = np.abs(np.append(errors[1], errors[2]))
-    finite = sizes[np.isfinite(sizes) & (sizes > 0.0)]
-    largest = finite.max(initial=0.0)
+    largest = sizes[np.isfinite(sizes)].max(initial=0.0)
+    is_rounding = sizes <= _ROUNDING * largest
+    finite = sizes[np.isfinite(sizes) & ~is_rounding]
     # in a unit of the largest value the least of a wide column would be nearly nothing
     if finite.size and largest > _WIDE * finite.min():
         largest = float(np.sqrt(largest * finite.min()))
     factor, shown = scaled(largest, unit)
     if unit == "%":
         factor, shown = 100.0, "%"
+    if sizes.shape == values.shape:
+        values = np.where(is_rounding, 0.0, values)
     texts = [
         bounded(
             factor * value,
@@ -782,7 +855,7 @@ def at_records(dataset: xr.Dataset, names: list[str]) -> Estimates:
             kind: applied.fillna(getattr(load, kind)).assign_attrs(load.value.attrs)
             for kind in ("value", "low", "high")
         }
-        result["normal_load"] = load._replace(**fields)
+        result["normal_load"] = load._replace(**fields, members=None)
     return result
 
 

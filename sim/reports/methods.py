@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.read.dataset import has_noise, sweep_dims, word
+from sim.read.dataset import has_noise, is_stationary, sweep_dims, word
 from sim.read.errors import systematic_errors
 from sim.read.statistics import over_members
 from sim.units.notation import engineering
@@ -73,6 +73,7 @@ def methods(dataset: xr.Dataset) -> Methods:
         step=_size(dataset["clock_step"]),
         duration=_size(dataset["clock_duration"]),
         is_random=bool(has_noise(dataset).any()),
+        is_stationary=is_stationary(dataset),
         errors=errors(dataset),
         estimated=is_estimated(dataset),
     )

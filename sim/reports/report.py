@@ -22,10 +22,11 @@ from sim.plots import kinds
 from sim.plots.kinds import Choices
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE
-from sim.quantities import QUANTITIES, Definition
+from sim.quantities import OPEN_THROUGHOUT, QUANTITIES, Definition
 from sim.read.dataset import claim
 from sim.read.errors import remarks
 from sim.read.estimate import Estimate
+from sim.read.observables import is_open_throughout
 from sim.read.run import Run
 from sim.read.statistics import over_members
 from sim.read.tables import figure, key_figures, notes, table, tables_of
@@ -270,14 +271,29 @@ def answer(run: Run, most: int = 3) -> list[str]:
         for name in (name for name in names if name in group):
             one = group[name]
             row = QUANTITIES.get(name, Definition(name, one.unit, ""))
-            reason = figure(one.isel(dict.fromkeys(one.value.dims, 0)), row)
             is_dull = group is late and not bool(one.value.fillna(0.0).any())
             if not bool(one.is_missing.all()):
                 known += [] if is_dull else [_sentence(one, row)]
             # after a hold the peak is that of a phase
-            elif reason == row.absent and not (held and name == "static_threshold"):
-                missing.append(f"There is no {one.value.long_name} ({reason}).")
-    return [*known, *missing][:most]
+            elif _never_happens(one, row) and not (held and name == "static_threshold"):
+                missing.append(f"There is no {one.value.long_name} ({row.absent}).")
+    return [*_open(run), *known, *missing][:most]
+
+
+def _never_happens(one: Estimate, row: Definition) -> bool:
+    """Return True if an event happens nowhere, for the reason of the registry alone."""
+    return one.reason is not None and bool((one.reason == row.absent).all())
+
+
+def _open(run: Run) -> list[str]:
+    """Return a sentence on contacts that are open throughout the run, if there are any."""
+    is_open = is_open_throughout(run.dataset)
+    count = int(is_open.sum())
+    if not count:
+        return []
+    sentence = OPEN_THROUGHOUT[:1].upper() + OPEN_THROUGHOUT[1:]
+    where = f" at {count} of {run.points} points" * (run.points > 1)
+    return [f"{sentence}{where}."]
 
 
 def _shares(run: Run) -> list[str]:
@@ -304,7 +320,8 @@ def _shares(run: Run) -> list[str]:
 
 def _sentence(one: Estimate, row: Definition) -> str:
     """Return a sentence on a quantity, of a sweep at the first and last point where it is known."""
-    text = one.value.long_name
+    # what a semicolon parts is for a table of meanings
+    text = str(one.value.long_name).partition(";")[0]
     subject = f"The {text}{',' * (',' in text)} is"
     known = {}
     for place in np.ndindex(one.value.shape):

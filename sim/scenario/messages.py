@@ -268,9 +268,15 @@ def _inner(field: FieldInfo | None) -> dict[str, type]:
 
 
 def _choice(word: Any, options: Iterable[str]) -> str:
-    """Return the words that may stand in place of a word, or the nearest of them."""
-    near = difflib.get_close_matches(word, options, 1) if isinstance(word, str) else []
-    return f'did you mean "{near[0]}"?' if near else f"must be {_either(options)}"
+    """Return the words that may stand in place of a word: those that begin with it, else the nearest one, else all."""
+    options = [*options]
+    if not isinstance(word, str):
+        return f"must be {_either(options)}"
+    near = [option for option in options if option.startswith(word)] if word else []
+    near = near or difflib.get_close_matches(word, options, 1)
+    if not near:
+        return f"must be {_either(options)}"
+    return f'"{word}" is not known; did you mean {_either(near)}?'
 
 
 def _either(names: Iterable[str | None]) -> str:

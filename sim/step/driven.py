@@ -18,6 +18,7 @@ from sim.parts.exchange import (
     Bonding,
     ContactState,
     Drive,
+    Flags,
     Motion,
     Sliding,
     Storing,
@@ -97,6 +98,8 @@ class Driven(Stepper):
         shear, energy = _held(state.shear, shear, energy)
         balance = scene.work.balance(bonding, energy, motions.position)
         touch = self._touch(state.contact, motions, balance, ends)
+        places = np.concatenate([slider.position[np.newaxis], motions.position])
+        touch = _held_contact(state.contact, touch, np.isnan(places))
         sliders, bonding = coupled.with_contact(parts, reached, around, touch.radius)
         if is_unloaded:  # the stage follows the slider
             sliders = sliders._replace(stage_position=sliders.position)
@@ -230,6 +233,41 @@ def _held(before: Storing, after: Storing, energy: Array) -> tuple[Storing, Arra
     for k in range(1, len(held)):
         held[k] = np.where(np.isnan(held[k]), held[k - 1], held[k])
     return after.holding(held[-1]), held[1:]
+
+
+def _held_contact(
+    before: ContactState, after: ContactState, ended: Flags
+) -> ContactState:
+    """Return the contact at the end of each step of a block, as it was wherever the motion of its slider has ended.
+
+    ``ended`` are flags of the motion at the start of the block and at the end of each step. Bonds that break as the
+    slider loses stability leave no work of adhesion, and the mount moves on. A contact that followed them would be
+    masked or opened in a motion that is not solved. A contact that opens in the step in which the motion ends stays
+    open, because the slider may have lost stability by that.
+    """
+    if not ended.any():
+        return after
+    held = after._replace(
+        work=after.work.copy(),
+        radius=after.radius.copy(),
+        detached=after.detached.copy(),
+        dissipated=after.dissipated.copy(),
+        turn=after.turn.copy(),
+    )
+    last = before
+    for k in range(len(held.radius)):
+        opens = np.isnan(held.radius[k]) & ~np.isnan(last.radius) & ~ended[k]
+        stays = ended[k + 1] & ~opens
+        for values, former in (
+            (held.work, last.work),
+            (held.radius, last.radius),
+            (held.detached, last.detached),
+            (held.dissipated, last.dissipated),
+        ):
+            values[k] = np.where(stays, former, values[k])
+        held.turn[k][stays] = np.nan
+        last = held.at(k)
+    return held
 
 
 def driven(scene: Scene) -> Driven:

@@ -10,7 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy
-from helpers.parts import Adhesion, Equilibrium, Time, jkr, load, read, read_sweep, run
+from helpers.parts import (
+    Adhesion,
+    Clock,
+    Equilibrium,
+    Time,
+    jkr,
+    load,
+    read,
+    read_sweep,
+    run,
+)
 from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, scene as small
 from numpy.testing import assert_allclose
 
@@ -30,7 +40,7 @@ from sim.ensemble.preview import preview
 from sim.ensemble.steady import sensitivities
 from sim.parts.bonds.models import Steady, Unbroken
 from sim.parts.drive import Steady as AtSpeed
-from sim.parts.shear.models import Banded
+from sim.parts.shear.models import Banded, Uniform
 from sim.parts.shear.modes import modes
 from sim.solid import HalfSpace
 from sim.spectrum.families import (
@@ -676,6 +686,37 @@ def test_a_pull_off_by_fluctuations_is_told_and_not_under_a_load_that_holds():
     shown = float(re.search(r"up to ([0-9.]+) %", text)[1])
     assert_allclose(shown, 100.0 * share, atol=100.0 / 256)
     assert pulled_off(0.1e-3) == []
+
+
+@pytest.mark.parametrize("fluctuates", [True, False])
+def test_a_contact_that_is_open_from_the_start_is_told_with_its_points(fluctuates):
+    """Half of the adhesion holds 198 µN, and in the third point all of it does not."""
+    parts = MASKED | {"drive": AtSpeed(speed=10e-3)}
+    parts |= {"shear": replace(MASKS, cell=0.2e-3) if fluctuates else Uniform()}
+
+    def told(*loads, **changes):
+        sweep = read_sweep({"contact.load": [f"{load:g} N" for load in loads]})
+        return diagnosis(Plan.of(small(sweep=sweep, **parts | changes)))
+
+    texts = told(4e-3, -0.3e-3, -0.5e-3)
+    (text,) = said(texts, "open for the whole run")
+    assert "-300 µN and -500 µN, 2 of 3 points" in text
+    # all others are of the point that is closed
+    others = [each for each in texts if each != text]
+    assert others and not [each for each in others if "-300 µN" in each]
+    dataset = run(
+        small(
+            contact=Equilibrium(load=-0.3e-3, after_pull_off="reattach"),
+            clock=Clock(0.1, 0.01),
+            **parts,
+        )
+    )
+    assert bool((dataset["in_contact"] == 0.0).all())
+    alone = told(-0.3e-3)
+    assert len(alone) == 1 and alone[0].startswith("open for the whole run")
+    assert not said(told(4e-3, 0.0), "open")
+    unbroken = told(-0.3e-3, bonds=Unbroken(stress=0.3e6))
+    assert fluctuates or not said(unbroken, "open")
 
 
 def test_the_largest_loss_answers_why_no_mechanism_takes_a_tenth_of_the_area():

@@ -310,7 +310,8 @@ LEAST_WORK = 1e-9
 def check_turns(scenario, course):
     """A contact is closed exactly as the fold of its mount and the first touch demand, by an own computation of both.
 
-    Left out: edges that lag, and works of adhesion that depend on the radius (a disc, a reversible share).
+    Left out: edges that lag, works of adhesion that depend on the radius (a disc, a reversible share), and steps in
+    which the motion ends or has ended, after which the contact stays as it was.
     """
     contact, bodies = scenario.contact, scenario.bodies
     if contact.lags or contact.reversible or scenario.margin is not None:
@@ -334,8 +335,13 @@ def check_turns(scenario, course):
         is_open[1:],
         np.broadcast_to(work > least, is_open.shape)[1:],
     )
+    ended = np.broadcast_to(np.isnan(course.position), is_open.shape)
+    assert not np.any(ended[:-1] & (before != after)), (
+        "a contact opens or closes after the end of the motion"
+    )
     lost, holds_on = value[1:] < fold[1:] - near, value[1:] > fold[1:] + near
     touches, apart = value[1:] > near, value[1:] < -near
+    lost, touches = lost & ~ended[1:], touches & ~ended[1:]
     never_closed = np.logical_and.accumulate(is_open)[:-1]
     assert not np.any(~before & ~after & lost), (
         "a contact is closed beyond its pull-off"

@@ -197,6 +197,18 @@ def test_several_curves_keep_their_mechanisms_by_a_line_of_the_area_with_the_bon
     )
 
 
+@pytest.mark.parametrize("fluctuates", [True, False])
+def test_a_mechanism_that_takes_nothing_but_rounding_is_no_part_of_a_legend(fluctuates):
+    parts = {} if fluctuates else {"shear": shear.Uniform()}
+    dataset = simulated(**parts)
+    radius = dataset["bonds_radius"]
+    odd = np.arange(radius.sizes["t"]) % 2
+    dataset = dataset.assign(bonds_radius=radius * (1.0 + np.finfo(float).eps * odd))
+    names = legend_of(plots.draw(dataset, "curve").axes[0])[0]
+    assert "lost to broken bonds" in names
+    assert ("lost to fluctuations" in names) is fluctuates
+
+
 def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the_speed_jumps(
     ramp,
 ):

@@ -26,7 +26,11 @@ import sim
 from sim.plots import KINDS, Choices, draw
 from sim.plots.style import swept_value
 
-SIZES = ("3.4x2.6in", "", "10x6in")
+#: A small size has the least room. The others are tried with the long checks.
+SIZES = (
+    "3.4x2.6in",
+    *(pytest.param(size, marks=pytest.mark.verify) for size in ("", "10x6in")),
+)
 LOADS = {"contact.load": [1e-3, 2e-3, 4e-3, 6e-3, 8e-3]}
 SITES = {"bond_stiffness": 4e-4, "rebinding_rate": 1e5, "site_density": 9e16}
 COHORT = bonds.Cohort(rupture=Bell(zero_force_rate=1e4, bell_force=4e-12), **SITES)

@@ -19,7 +19,7 @@ from sim.laws.schallamach import (
     resolved_onset,
 )
 from sim.parts.bonds.models import Cohort, FirstMoment
-from sim.plots import curves, draw
+from sim.plots import curves, draw, style
 from sim.read import slips
 
 #: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.
@@ -38,6 +38,11 @@ def driven(kind):
             Force(force=0.5 * most),
             0.2,
             {"drive.force": [0.5 * most, 1.3 * most]},
+        ),
+        "both ways": (
+            Force(force=0.5 * most),
+            0.2,
+            {"drive.force": [-0.5 * most, 0.5 * most]},
         ),
         "map": (
             Spring(stage=ramp, stiffness=100.0, damping=1e-2, start="steady"),
@@ -174,6 +179,28 @@ def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_l
     assert_allclose(own[1], area[:top] / area[0], rtol=1e-12)
 
 
+def test_creep_in_both_directions_is_drawn_on_linear_axes_which_show_both():
+    position, speed = rendered(draw(driven("both ways"), "creep")).axes
+    assert position.get_yscale() == speed.get_yscale() == "linear"
+    back, forth = lines_of(position)
+    assert_allclose(back[1], -forth[1], rtol=1e-9)
+
+
+def test_a_legend_has_no_name_of_a_line_without_a_point():
+    figure, (panel,) = style.rows([2.0])
+    panel.set_yscale("log")
+    x, nothing = [1.0, 2.0], [math.nan, math.nan]
+    panel.plot(x, x, label="drawn")
+    panel.plot(x, nothing, label="missing")
+    panel.plot(x, [-1.0, -2.0], label="without a logarithm")
+    panel.errorbar(x, nothing, nothing, label="missing with bars")
+    panel.errorbar(x, x, x, label="drawn with bars")
+    panel.plot([], [], label="a sample of a look")
+    style.legend(panel)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {*names} == {"drawn", "drawn with bars", "a sample of a look"}
+
+
 def pulled(exponent):
     """A run whose area is lost as a power of the force."""
     dataset = driven("pull").copy(deep=True)
@@ -200,6 +227,24 @@ def test_only_a_loss_as_the_square_of_the_force_has_an_alpha_and_a_law(
         force, area = driven("pull")["spring_force"], driven("pull")["contact_area"]
         alpha = 1e6 * 0.2 * float(area[0] / force.max() ** 2)
         assert any(f"{alpha:.3g} mm$^2$/N$^2$" in name for name in names)
+
+
+@pytest.mark.parametrize(
+    "share_left",
+    [
+        lambda share: 1.0 + 0.02 * share - 0.1 * share**2,
+        lambda share: 1.0 - 0.1 * (np.exp(8.0 * share) - 1.0) / np.exp(8.0),
+    ],
+)
+def test_a_loss_that_no_power_of_the_force_describes_has_no_exponent(share_left):
+    """The first area grows before it falls, and the second falls faster than any power."""
+    dataset = pulled(2.0)
+    force, area = dataset["spring_force"], dataset["contact_area"]
+    left = area[0] * share_left(force / force.max())
+    dataset["contact_area"] = left.assign_attrs(area.attrs)
+    panel = rendered(draw(dataset, "incipient")).axes[0]
+    assert not [line for line in panel.lines if "Q" in str(line.get_label())]
+    assert len(lines_of(panel)) == 1
 
 
 def test_figures_of_a_slider_are_refused_with_the_cure_where_they_cannot_be_drawn():

@@ -98,6 +98,8 @@ def test_stress_and_bonds_are_drawn_over_the_speed_beside_the_law_of_every_ruptu
         dataset = ramped(bonds.Cohort(rupture=rupture, **SITES), clock=short)
         stress, _ = slider.steady_law(dataset, {}, speed)
         assert_allclose(stress, exact, rtol=2e-4)
+        # the stress has the sign of the speed
+        assert_allclose(slider.steady_law(dataset, {}, -speed)[0], -exact, rtol=2e-4)
         plots.draw(dataset, "stress")
     dataset = ramped(sweep={"bonds.rupture.bell_force": [4e-12, 8e-12]}, clock=short)
     for k, force in enumerate((4e-12, 8e-12)):

@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.lens import scene
+from helpers.lens import FIELD, scene
 from helpers.parts import (
+    Band,
     Bell,
     Clock,
     Ensemble,
     Equilibrium,
+    Time,
     bonds,
     drive,
     jkr,
@@ -29,7 +31,10 @@ from scipy.optimize import fsolve
 
 import sim
 from sim.laws.schallamach import bell_peak
-from sim.read.peaks import static_threshold
+from sim.quantities import OPEN_THROUGHOUT, STAYS_CLOSED
+from sim.read.peaks import ensemble_peaks, static_threshold
+from sim.read.tables import key_figures, notes, tables_of
+from sim.reports.report import answer
 from tests.read.test_invariance import LENS, SCENES
 
 NAN = math.nan
@@ -211,7 +216,7 @@ def test_a_loop_is_what_its_jumps_dissipate_nothing_without_and_the_area_of_a_ci
         assert errors[1] < 0.5 * errors[0]
         headings = set(rows_of(dataset, read.highlights)[0])
         assert {heading.partition(" (")[0] for heading in headings} >= {
-            "∮P dΔ, per cycle",
+            "∫P dΔ, per cycle",
             "dissipated, per cycle",
             "detached, of members",
         }
@@ -706,6 +711,111 @@ def test_a_maximum_along_a_ramp_is_where_an_own_integration_has_it_within_its_bo
         found = result[f"peak_{name}"]
         assert abs(float(found.value) - truth) <= float(found.bound)
     assert float(result["peak_time"].bound) <= most * step
+
+
+@pytest.mark.parametrize("fluctuates", [False, True])
+@pytest.mark.parametrize(
+    ("indentation", "is_open"), [(-0.35e-6, True), (-0.02e-6, False)]
+)
+def test_a_contact_that_never_closes_has_no_event_of_a_contact(
+    indentation, is_open, fluctuates
+):
+    """The bonds left at the start cannot hold the sphere, and nothing closes its contact again."""
+    weak = FIELD | {"spectrum": Band(rms=50e3, longest=60e-6, shortest=24e-6)}
+    field = shear.Modal(correlation=Time(time=0.01), **weak)
+    dataset = run(
+        scene(
+            contact=Equilibrium(indentation=indentation, after_pull_off="reattach"),
+            drive=drive.Ramp(start=2e-2, stop=-2e-2),
+            bonds=bonds.Steady(critical_speed=5e-3, stress=3e5),
+            clock=Clock(0.4, 5e-3),
+            shear=field if fluctuates else shear.Uniform(),
+        )
+    )
+    assert bool((dataset["in_contact"] == 0.0).all()) is is_open
+    read_run = read.Run(dataset)
+    names = ("pull_off_load", "jump_in_load", "peak_stress", "peak_friction")
+    reasons = {
+        name: str(read_run.events[name].reason.item())
+        for name in names
+        if bool(read_run.events[name].is_missing)
+    }
+    shown = [row[""] for row in key_figures(read_run)]
+    first, *others = answer(read_run)
+    if is_open:
+        assert [*reasons] == [*names] and {*reasons.values()} == {OPEN_THROUGHOUT}
+        assert "open" in first and not others
+        assert not [name for name in shown if "peak" in name]
+    else:
+        assert reasons["pull_off_load"] == STAYS_CLOSED
+        assert "peak_stress" not in reasons
+        assert not [words for words in (first, *others) if "is open" in words]
+
+
+def test_peaks_of_friction_that_lack_a_contact_or_records_have_their_own_reasons():
+    dataset = run(
+        scene(clock=Clock(0.4, 0.01), drive=drive.Ramp(start=1e-5, stop=1e-3))
+    )
+    force = dataset["friction_force"]
+    opened = dataset.assign(friction_force=force.where(force["t"] < 0.2))
+    few = dataset.isel(t=slice(None, None, 8))
+    words = [
+        str(ensemble_peaks(each)["peak_friction"].reason.item())
+        for each in (opened, few)
+    ]
+    assert "closed" in words[0] and "records" in words[1]
+    assert not any("or members" in each for each in words)
+
+
+def test_the_peak_of_a_mean_has_the_errors_of_its_records_and_of_the_clock_step():
+    """Masked contacts have Hertz's area, so that friction peaks where the stress does."""
+    masks = FIELD | {"spectrum": Band(rms=2e6, longest=60e-6, shortest=24e-6)}
+    dataset = run(
+        scene(
+            clock=Clock(2.0, 5e-3, record=20e-3),
+            drive=drive.Ramp(start=5e-2, stop=2e-5, scale="log"),
+            shear=shear.Modal(correlation=Time(time=0.01), **masks),
+            bonds=bonds.FirstMoment(
+                rupture=Bell(zero_force_rate=25.0, bell_force=4e-12),
+                bond_stiffness=0.8e-6,
+                rebinding_rate=250.0,
+                site_density=6.5e16,
+            ),
+        )
+    )
+    assert bool(dataset["masked"].all())
+    read_run = read.Run(dataset)
+    stress, force = (read_run.events[f"peak_{of}"] for of in ("stress", "friction"))
+    area = math.pi * dataset["hertz_radius"].isel(t=0).item() ** 2
+    assert float(force.bound) > 0.0
+    assert abs(float(force.value) - area * float(stress.value)) <= float(force.bound)
+    for place in ("time", "speed"):
+        exact = read_run.events[f"peak_{place}"]
+        found = read_run.events[f"peak_friction_{place}"]
+        apart = abs(float(found.value) - float(exact.value))
+        assert 0.0 < apart <= float(found.bound + exact.bound)
+        assert "records" in found.source and "step" in found.source
+    (row,) = (row for row in key_figures(read_run) if row[""] == "peak of friction")
+    assert "mean" in row["definition"] and "largest" not in row["definition"].lower()
+    heading = [
+        words
+        for words in notes(read_run, tables_of(read_run)).headings
+        if words.startswith("peak of friction:")
+    ]
+    assert heading and all("mean" in words for words in heading)
+
+
+def test_half_of_the_members_have_had_an_event_only_if_there_are_several():
+    masks = FIELD | {"spectrum": Band(rms=2e6, longest=60e-6, shortest=24e-6)}
+    for count in (1, 3):
+        dataset = run(
+            scene(
+                ensemble=Ensemble(members=count),
+                shear=shear.Modal(correlation=Time(time=0.01), **masks),
+            )
+        )
+        events = read.Run(dataset).events
+        assert ("half_masked" in events) is (count > 1) and "ever_masked" in events
 
 
 @pytest.mark.parametrize(

@@ -204,6 +204,18 @@ def test_a_dataset_of_an_older_version_says_what_it_lacks(folder):
     assert sim("stats", "out.nc").stderr == ""
 
 
+def test_a_dataset_without_adhesion_lacks_nothing(folder):
+    with package.open("out.nc") as dataset:
+        lacks_masking = dataset.load().drop_vars(["time_masked", "masked"])
+    lacks_masking.to_netcdf("old.nc")
+    assert "masked" in sim("stats", "old.nc").stderr
+    changes = ["--set", 'adhesion.work="0 J/m^2"', "-o", "bare.nc", "--no-table"]
+    assert sim("run", "scene.toml", *changes).exit_code == 0
+    for command in (["stats"], ["report"], ["plot", "time"]):
+        done = sim(command[0], "bare.nc", *command[1:])
+        assert done.exit_code == 0 and done.stderr == ""
+
+
 @pytest.mark.parametrize(
     "text",
     ["alice,hunter2\nbob,swordfish\n", "time [s], speed [m/s]\n-31415,hunter2\n"],

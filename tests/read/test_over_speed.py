@@ -796,6 +796,64 @@ def test_no_speed_is_stated_at_which_more_is_lost_than_can_be_nor_under_a_force(
         read.loss_speeds(run(creeping), ["10 %"])
 
 
+@pytest.mark.parametrize(("at_rest", "is_bound"), [(0.8, False), (0.98, True)])
+def test_a_loss_that_rest_has_already_has_no_speed(at_rest, is_bound):
+    speeds, left = np.array([0.0, 1e-3, 2e-3]), np.array([[at_rest, 0.79, 0.78]])
+    result = read.crossing(speeds, left, np.ones(1), 0.95)
+    assert math.isnan(result.speed) and math.isnan(result.low)
+    assert_allclose(result.high, 1e-3 if is_bound else math.nan, rtol=1e-12)
+    assert "at rest" in result.reason and "lowest" not in result.reason
+
+
+def test_a_loss_that_was_reached_in_the_noise_has_no_bound_at_the_highest_speed():
+    """The mean of two members is below the level at one speed, and surely above it at the highest one."""
+    speeds, off = np.geomspace(1e-3, 1e-2, 9), np.full(9, 0.02)
+    mean = np.full(9, 0.9)
+    mean[5], off[5], off[-1] = 0.75, 0.2, 0.0
+    result = read.crossing(speeds, np.stack([mean - off, mean + off]), np.ones(2), 0.8)
+    assert math.isnan(result.speed) and not result.low > speeds[5]
+    assert "noise" in result.reason
+    calm = np.where(mean < 0.8, 0.9, mean)
+    result = read.crossing(speeds, np.stack([calm - off, calm + off]), np.ones(2), 0.8)
+    assert_allclose(result.low, speeds[-1], rtol=1e-12)
+    assert "highest speed" in result.reason
+
+
+@pytest.mark.parametrize("ends", [(2e-2, 1e-4), (1e-4, 2e-2)])
+def test_a_bound_of_a_speed_is_one_of_the_run(ends):
+    """Bonds are late along a ramp, but at its start they have felt no other speed."""
+    start, stop = ends
+    late = bonds.Rate(critical_speed=5e-2, rebinding_rate=100.0)
+    ramp = drive.Ramp(start=start, stop=stop)
+    clock = Clock(0.5, 5e-3)
+    parts = {"drive": ramp, "bonds": late, "shear": shear.Uniform(), "clock": clock}
+    result = read.loss_speeds(run(scene(**parts)), ["0.01 %", "30 %"])
+    low, high = (result[f"speed_at_{loss}_percent_lost"] for loss in ("0.01", "30"))
+    # a bound is above the lowest speed, or below the highest one, by the delay at the end of the ramp
+    bound = high.low if start > stop else low.high
+    assert_allclose(bound, start, rtol=1e-12)
+
+
+def test_contacts_without_adhesion_or_that_never_close_have_no_speed_of_a_loss():
+    """The loss of an open contact has no speed in steady sliding either."""
+    late = bonds.Rate(critical_speed=5e-3, rebinding_rate=20.0)
+    parts = {"bonds": late, "shear": shear.Uniform()}
+    drawn = Equilibrium(indentation=-0.35e-6, after_pull_off="reattach")
+    ramp = drive.Ramp(start=2e-2, stop=1e-4)
+    absent = {
+        "at most 0 %": {"adhesion": Adhesion(work=0.0)},
+        "open": {"contact": drawn, "drive": ramp},
+    }
+    for words, changes in absent.items():
+        dataset = run(scene(**parts, **changes))
+        assert read.loss_speeds(dataset) == {}
+        result = read.loss_speeds(dataset, ["10 %"])
+        assert not [name for name in result if name.startswith("steady_speed")]
+        assert words in result["speed_at_10_percent_lost"].reason.item()
+        assert bool(result["speed_at_10_percent_lost"].is_missing)
+    assert read.loss_speeds(run(scene(**parts)))
+
+
 def test_below_the_maximum_of_friction_any_spring_slides_steadily():
     path = Path(sim.__file__).parents[1] / "scenarios" / "stick_slip.toml"
     point = sim.load(path).points()[0]

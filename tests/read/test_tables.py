@@ -28,7 +28,7 @@ from helpers.statements import shares, statistics
 from numpy.testing import assert_allclose, assert_array_equal
 
 import sim
-from sim.read import export
+from sim.read import export, tables
 from sim.read.observables import with_slips
 from sim.units.errors import BadInput
 from sim.units.notation import in_units
@@ -406,3 +406,11 @@ def test_a_missing_number_has_the_reason_of_the_registry_at_the_first_of_its_poi
     assert line in read.notes(one, [table]).needed
     frame = sim.stats(one.dataset)
     assert_array_equal(frame["half_masked_reason"], [words, "", words])
+
+
+def test_the_unit_of_a_column_is_that_of_its_values_and_not_of_their_roundings():
+    values = np.array([0.0, 4.1e-3, -2e-2, 4e-22, math.nan])
+    unit, cells = tables._column_of("N", values)
+    assert (unit, cells) == ("mN", ["0", "4.1", "-20", "0", "–"])
+    # a wide column of true values keeps them all
+    assert tables._column_of("N", np.array([1e-9, 1e-3]))[1] == ["0.001", "1000"]

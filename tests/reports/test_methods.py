@@ -70,3 +70,20 @@ def test_the_references_are_those_of_the_citation_file(noisy):
     assert re.findall("doi: (.*)", citation)[1] in paper  # the corrigendum
     assert bibtex.count("{") == bibtex.count("}")
     assert str(sim.methods(noisy)).endswith(bibtex)
+
+
+def test_methods_of_one_member_name_a_standard_error_over_time_or_none():
+    def bracket(**keys):
+        clock = Clock(duration=0.04, step=0.002)
+        text = sim.methods(simulated(seed=23, clock=clock, **keys)).text
+        return [each for each in text.split(". ") if "standard error" in each]
+
+    one = Ensemble(members=1)
+    for keys, has, lacks in (
+        ({"ensemble": one, "drive": STEADY}, "in time", "members"),
+        ({"ensemble": one}, "no standard error", "members"),
+        ({"ensemble": Ensemble(members=2), "drive": STEADY}, "in time", "One"),
+        ({"ensemble": Ensemble(members=2)}, "over the members", "in time"),
+    ):
+        sentence = bracket(**keys)[0]
+        assert has in sentence and lacks not in sentence

@@ -394,6 +394,17 @@ PULLED = {
 }
 
 
+def test_a_caption_of_a_course_names_no_line_that_is_not_drawn():
+    """Without the radii of JKR and Hertz the figure has neither of them."""
+    dataset = simulated(record=Record(quantities=("work_of_adhesion",)))
+    (course,) = (
+        each for each in report.drawings(read.Run(dataset)) if each.kind == "time"
+    )
+    assert "Hertz" not in course.svg
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", report.html(dataset))
+    assert captions and not [words for words in captions if "Hertz" in words]
+
+
 @pytest.mark.parametrize("lowest", [-0.5e-3, -0.1e-3])
 def test_an_answer_names_a_pull_off_only_if_the_contact_opened(lowest):
     course = {"time": [0.0, 1.0], "value": [4e-3, lowest]}

@@ -150,6 +150,12 @@ TABLES = [
     (RATE, BELL.replace('model = "bell", ', ""), "bonds.rupture.model", '"bell"'),
     ('model = "modal"', 'model = "modl"', "shear.model", 'did you mean "modal"'),
     (
+        "[clock]",
+        '[record]\nquantities = ["friction"]\n\n[clock]',
+        "record.quantities",
+        '"friction" is not known; did you mean "friction_force"',
+    ),
+    (
         'model = "slip"',
         "model = 3",
         "shear.correlation.model",

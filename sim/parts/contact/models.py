@@ -358,7 +358,7 @@ class _Controlled:
         remarks = self._cut_short(setting)
         if not math.isnan(setting.rest_radius):
             return remarks
-        never = "is open for the whole run: raise contact.{} to zero, where the sphere touches"
+        never = "is open even with all its adhesion: raise contact.{} to zero, where the sphere touches"
         jumps = "begins open and jumps in where contact.{} first reaches zero"
         course = jumps if max(self.course.extremes) >= 0.0 else never
         return [f"the contact {course.format(self.kind)}", *remarks]

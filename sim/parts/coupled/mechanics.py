@@ -256,16 +256,22 @@ def later(contact, time, stays):
 
 
 @device
+def _fluctuating_by(contact, energy, rate):
+    """Return the numbers of the contact with another energy of the fluctuations, and its rate."""
+    return Contact(*contact[:13], energy, rate, contact.field)
+
+
+@device
 def feeling(contact, row):
     """Return the numbers of the contact with the energy of the fluctuations that the row has reached."""
-    return Contact(*contact[:13], row.felt, 0.0, contact.field)
+    return _fluctuating_by(contact, row.felt, 0.0)
 
 
 @device
 def drawn(contact, row, piece):
     """Return the numbers of the contact at the start of a piece: at that of a clock step ΔΓ has been drawn."""
     fluctuating = row.drawn if piece == 0 else row.felt
-    return Contact(*contact[:13], fluctuating, 0.0, contact.field)
+    return _fluctuating_by(contact, fluctuating, 0.0)
 
 
 @device
@@ -312,7 +318,7 @@ def following(contact, row, start, step):
     rate = (
         row.paid * last * (row.energy + change) - mean + share * (mean - row.felt)
     ) / step
-    return Contact(*contact[:13], row.felt - rate * start, rate, field)
+    return _fluctuating_by(contact, row.felt - rate * start, rate)
 
 
 @device
