@@ -19,6 +19,7 @@ from sim.read.control_variate import sources
 from sim.read.dataset import (
     MEMBERS,
     STATISTIC,
+    all_go_on,
     control,
     ensemble_mean,
     only_statistics,
@@ -188,10 +189,21 @@ def with_slips(dataset: xr.Dataset) -> xr.Dataset:
     is_driven = needed <= {*dataset} and "bonds_sites" in dataset.variables
     if not is_driven or dataset.sizes["t"] < 2:
         return dataset
-    moved = ensemble_mean(dataset["slider_position"]).astype(float).differentiate("t")
+    position, recorded = ensemble_mean(dataset["slider_position"]), dataset["speed"]
+    position = position.astype(float)
+    # at the end of a motion there is no later position
+    backward = position.diff("t") / dataset["t"].diff("t")
+    moved = position.differentiate("t").fillna(backward)
     later = dataset["t"] > dataset["t"][0]  # at the start nothing has moved yet
-    recorded = dataset["speed"]
-    speed = with_mean(recorded, moved.where(later, ensemble_mean(recorded)))
+    speed = moved.where(later, ensemble_mean(recorded))
+    if STATISTIC in recorded.dims:
+        # a mean position has a speed as long as it is that of the same members, whose spread is not known
+        going = all_go_on(dataset)
+        speed = speed if going is None else speed.where(going)
+        is_mean = xr.DataArray(
+            np.arange(recorded.sizes[STATISTIC]) == 0, dims=STATISTIC
+        )
+        speed = speed.where(is_mean).transpose(*recorded.dims)
     return dataset.assign(speed=speed.assign_attrs(recorded.attrs))
 
 

@@ -406,7 +406,8 @@ def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
                 )
             )
             return Peak(
-                f"no peak above the noise: at most {most} after {when}, {end} over the last eighth"
+                "no peak is certain: before the last eighth of the records the mean is "
+                f"{most} at most, after {when}, and over it {end}"
             )
     if place < 3:
         step = engineering(float(times[place]) / 4.0, "s")

@@ -633,8 +633,11 @@ def key_figures(run: Run) -> list[dict[str, str]]:
             if abs(here.value - column.dull) < _ROUNDING:
                 continue
             sample = str(about.get("over", ""))
-            if here.members is not None and here.members < run.members:
-                sample = with_a_value(sample, run.members, int(here.members))
+            known = run.members if here.members is None else int(here.members)
+            if here.is_missing:
+                sample = ""  # the reason stands in place of a mean
+            elif known < run.members:
+                sample = with_a_value(sample, run.members, known)
             over = f"; mean over the {sample}" if sample else ""
             where = [
                 f"phase {here.value[dim].item()}"
@@ -790,12 +793,14 @@ def _column_of(
     finite = sizes[np.isfinite(sizes) & ~is_rounding]
     # in a unit of the largest value the least of a wide column would be nearly nothing
     if finite.size and largest > _WIDE * finite.min():
-        largest = float(np.sqrt(largest * finite.min()))
+        largest = max(float(np.sqrt(largest * finite.min())), largest / _WIDE)
     factor, shown = scaled(largest, unit)
     if unit == "%":
         factor, shown = 100.0, "%"
     if sizes.shape == values.shape:
         values = np.where(is_rounding, 0.0, values)
+        scatter = np.where(errors[0] <= _ROUNDING * largest, 0.0, errors[0])
+        errors = [scatter, *errors[1:]]
     texts = [
         bounded(
             factor * value,

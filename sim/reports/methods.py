@@ -35,8 +35,8 @@ _NUMBERS = (
     "temperature_value",
     "temperature_reference",
 )
-#: Times at least at which the standard error is looked at, and an error that is of rounding.
-_TIMES, _ROUNDING = 24, 1e-12
+#: A standard error that is of rounding.
+_ROUNDING = 1e-12
 
 
 class Methods(NamedTuple):
@@ -91,13 +91,11 @@ def errors(dataset: xr.Dataset) -> list[str]:
     """Return the systematic errors that matter, and the largest standard error of a run, in words."""
     known = systematic_errors(dataset)
     result = [str(error._replace(cure="")) for error in known if error.matters]
-    stride = max(dataset.sizes["t"] // _TIMES, 1)
-    records = dataset.isel(t=slice(None, None, stride))
-    ratios = over_members(records, ["area_ratio"], quantiles=False)
+    ratios = over_members(dataset, ["area_ratio"], quantiles=False)
     sem = ratios["area_ratio"].sem if "area_ratio" in ratios else None
     if sem is not None and (error := float(sem.max())) > _ROUNDING:
         words = "largest standard error of the mean area over JKR's"
-        result.append(f"{words}, of {records.sizes['t']} times, {100.0 * error:.3g} %")
+        result.append(f"{words} {100.0 * error:.3g} %")
     return result
 
 

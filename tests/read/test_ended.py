@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sim.parts.drive import Steady
 from sim.plots import curves
 from sim.read import tables
+from sim.read.observables import with_slips
 from sim.read.statistics import interval
 from sim.spectrum.families import Ripple
 
@@ -210,3 +211,22 @@ def test_the_mean_of_a_figure_over_time_ends_with_the_first_motion_that_ends(swe
         assert np.isfinite(calm.values("slider_position", calm.lines[0])).all()
         over = curves.scene_along(dataset, "drive_force")
         assert "those of them that have a value" in over.averaged
+
+
+def test_the_speed_of_recorded_statistics_is_that_of_the_same_members_and_has_no_spread(
+    swept,
+):
+    each, pooled = (with_slips(dataset) for dataset in swept)
+    alive = each["slider_position"].notnull().all("member")
+    mean, spread, error = pooled["speed"].transpose("statistic", ...)
+    assert not alive.all() and alive.any()
+    # a mean over the members that are left would go back
+    later = each["t"] > each["t"][0]
+    exact = each["speed"].mean("member").where(alive)
+    assert_array_equal(mean.isnull(), exact.isnull())
+    # at the last record the mean position has a difference to one side alone
+    inside = later & (alive.shift(t=-1, fill_value=False) | alive.all("t"))
+    assert_allclose(mean.where(inside), exact.where(inside), rtol=1e-9, atol=1e-15)
+    assert spread.isnull().all() and error.isnull().all()
+    # each motion has a speed to its last record
+    assert_array_equal(each["speed"].isnull(), each["slider_position"].isnull())

@@ -414,3 +414,7 @@ def test_the_unit_of_a_column_is_that_of_its_values_and_not_of_their_roundings()
     assert (unit, cells) == ("mN", ["0", "4.1", "-20", "0", "–"])
     # a wide column of true values keeps them all
     assert tables._column_of("N", np.array([1e-9, 1e-3]))[1] == ["0.001", "1000"]
+    # in a unit of the largest value, if the least is next to nothing
+    assert tables._column_of("N", np.array([1e-14, 2e-2]))[0] == "µN"
+    zero = np.array([1e-2, 0.0]), (np.array([0.0, 1e-19]), np.nan, np.nan, 0.0)
+    assert tables._column_of("N", *zero)[1] == ["10", "0"]

@@ -508,10 +508,10 @@ def test_a_slip_to_a_hertzian_contact_is_the_limit_of_ever_less_viscosity_and_ke
 
 
 @pytest.mark.parametrize("model", ["rate", "cohort", "tracked"])
-def test_a_contact_closes_alike_with_the_bonds_of_a_motion_that_has_ended_also_if_it_is_resumed(
+def test_a_contact_stays_as_it_was_when_the_motion_ended_also_if_the_run_is_resumed(
     model,
 ):
-    # nothing holds a body in an open contact against a force: its motion ends at once, its bonds stay
+    # nothing holds a body in an open contact against a force: its motion ends at once, and the mount goes on
     lens = {"model": model, "sites": 50} if model == "tracked" else {"model": model}
     scenario = sim.load(
         {
@@ -540,14 +540,9 @@ def test_a_contact_closes_alike_with_the_bonds_of_a_motion_that_has_ended_also_i
     middle, _ = driven.follow(scenario, noise, None, range(cut + 1))
     _, resumed = driven.follow(scenario, noise, middle, range(cut + 1, 201))
     assert np.all(end.drive.runaway_time == 0.0)
-    assert np.isnan(course.radius[cut]).all() and np.any(course.radius[cut:] > 0.0)
-    assert np.array_equal(course.radius[cut + 1 :], resumed.radius, equal_nan=True)
-    # JKR's contact with the work of adhesion of these bonds
-    closed = course.radius[:, 0] > 0.0
-    depth = scenario.contact.course.at(course.time[closed, 0], 0.2)
-    work = 42e-3 * course.fraction[closed, 0]
-    exact = jkr.radius_at_indentation(depth, work, 2e-3, 6.4e6)
-    assert_allclose(course.radius[closed, 0], exact, rtol=1e-9)
+    assert np.isnan(course.radius).all() and np.isnan(resumed.radius).all()
+    assert np.array_equal(course.work[cut + 1 :], resumed.work, equal_nan=True)
+    assert (course.work == course.work[0]).all()
 
 
 @pytest.mark.parametrize("edge", [{}, {"front_speed": 1.0, "model": "rate_dependent"}])
