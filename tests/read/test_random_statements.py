@@ -162,17 +162,18 @@ def test_a_table_prints_the_numbers_of_the_statements_in_any_unit(seed):
             if key[0] == name and key[2] != LATE
         ]
         factor = Quantity(base, name).read(f"1 {plain(unit)}") if unit else 1.0
+        sizes = [abs(number.value) for number in expected]
+        largest = max(filter(math.isfinite, sizes), default=0.0)
         for text, number in zip(texts, expected, strict=True):
             numerals = parsed(text)
             if numerals is None:  # an end of an interval in place of a value
                 is_right = math.isnan(number.value)
             else:
                 value, error, bound, rounding = (factor * part for part in numerals)
-                # a share of rounding is 0
-                is_right = abs(value - number.value) <= 1.001 * rounding + 1e-13 * (
-                    base == "1"
-                )
-                is_right &= not abs(error - number.error) > 1.001 * rounding
+                # a share of rounding is 0, and so is a value of rounding beside others of its column
+                nothing = 1e-13 * max(largest, float(base == "1"))
+                is_right = abs(value - number.value) <= 1.001 * rounding + nothing
+                is_right &= not abs(error - number.error) > 1.001 * rounding + nothing
                 is_right &= not abs(bound - number.bound) > 0.06 * number.bound
             wrong += [] if is_right else [f"{name}: {text} {unit} | {number}"]
     assert not wrong, "\n".join(wrong[:8])
@@ -233,6 +234,8 @@ def test_twice_the_members_change_a_mean_by_four_standard_errors_at_most(seed):
             return True
         if key[2] == RUN and math.isnan(second.error):  # of medians and rates
             return difference <= first.half + second.half
+        if key[0].startswith("peak_") and difference <= first.bound:
+            return True  # the place of a peak is known to the time between two records
         if opens and sim.quantities.QUANTITIES[key[0]].absent:
             return True  # of a part of the members
         total = second.error**2 * 2.0 * MEMBERS * (2.0 * MEMBERS - 1.0)
