@@ -439,7 +439,8 @@ def peak_of_mean(values: Array, times: Array, unit: str = "1") -> Peak:
         0.0, 0.125 * float(np.array([-1.0, 2.0, -1.0]) @ mean[place - 1 : place + 2])
     ) * (width < 2)
     time, first, stop = np.interp([at, ends[0] - 0.5, ends[1] + 0.5], records_at, times)
-    time_sem = float(np.std(places)) * float(times[1] - times[0])
+    # places that all are the same record have an error that the bound by the records holds
+    time_sem = float(np.std(places)) * float(times[1] - times[0]) or math.nan
     return Peak(
         "",
         value,

@@ -674,7 +674,7 @@ def test_a_wave_has_four_pixels_or_no_picture():
     inner = (row[1:-1] > row[:-2]) & (row[1:-1] >= row[2:])
     phase = np.pi * found["side"] / len(stress) / 24e-6
     assert np.all(row[1:-1][inner] >= 0.999 * 375e3 * np.cos(phase))
-    assert inner.sum() == pytest.approx(found["side"] / 24e-6, abs=1.0)
+    assert abs(inner.sum() - found["side"] / 24e-6) <= 1.0
     short = scene.with_values({"shear.spectrum.wavelength": 1e-6})
     assert contact(short, 3e-3)["stress"] is None
 

@@ -629,10 +629,10 @@ def _piece(line, bonds, slider, contact, law, room, books):
             place = start, mechanics.BRIEF * length
             at_here = nodes[0], energy
             # the speed grows beyond all bounds before the force falls by a stretch that is resolved
-            new_count, ahead = -1, (start, 0.5 * rules.cell / unit)
+            new_count, within_a_cell = -1, (start, 0.5 * rules.cell / unit)
             if rules.limit < math.inf and brittle:
                 new_count = _slip_event(
-                    row, pool, count, ahead, slider, contact, law, at_here
+                    row, pool, count, within_a_cell, slider, contact, law, at_here
                 )
             if new_count >= 0:
                 count, row.next_step = new_count, 1e-6 * length
