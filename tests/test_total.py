@@ -49,7 +49,7 @@ SEEDS = [
     1240,
     1293,
 ]
-SEEDS += [1319, 1399, 3253, 3335, 3928, 4039, 5053]
+SEEDS += [1319, 1399, 3253, 3335, 3928, 4039, 5053, 6527]
 #: That of a scene that is refused, with a reason.
 REFUSED = (75,)
 #: Scenes on layers that are always run.

@@ -536,13 +536,14 @@ def after(
     within a step. Where the slopes are known, a maximum between the ends is that of the cubic through values and
     slopes, of fourth order, if neither slope alone would change the value by more than five times its size within the
     step. It is at most what the tangents at both ends allow, because a kink between them would lift the cubic above
-    both. Where the slopes are unknown, or contradict the values (bonds follow the mean speed of a step), and for the
-    pull, a sample above its two neighbours is refined by the parabola through the three, of third order, if both
-    neighbours have more than half of its value: a quantity that jumps is not smooth there.
+    both. Where the slopes contradict the values (bonds follow the mean speed of a step), and for the pull, a sample
+    above its two neighbours is refined by the parabola through the three, of third order, if both neighbours have more
+    than half of its value: a quantity that jumps is not smooth there.
 
-    The stress of bonds without a stretch has kinks wherever the slider starts or stops, and jumps with its speed. Its
-    maximum is therefore that of the samples, of second order, and the strength at the end of a stick phase. The
-    friction is refined by a parabola only where it follows the contact area rather than the stress.
+    The stress of bonds without a stretch has kinks wherever the slider starts or stops, and jumps with its speed, and
+    that of bonds that are followed one by one jumps as each breaks. Neither has a known slope. Its maximum is therefore
+    that of the samples, and the strength at the end of a stick phase. The friction is refined by a parabola only where
+    it follows the contact area rather than the stress.
     """
     start, radius_before = before
     stress, stiffness, relaxation = (
@@ -570,7 +571,8 @@ def after(
         motions.time[:, 0],
         motions.duration[:, 0],
     )
-    bent = np.isnan(bonding.frozen).all()  # bonds without a stretch
+    # bonds without a stretch have kinks, bonds that are followed one by one jump
+    bent = np.isnan(bonding.relaxation).all()
     _follow(
         (stress, stiffness, relaxation),
         (radii, pull, contact.work, contact.detached, contact.turn),

@@ -308,6 +308,14 @@ class Bonding(NamedTuple):
         """Return the bonds at the end of step k of a block."""
         return Bonding(*(values[k] if values.ndim > 1 else values for values in self))
 
+    def carried(self, radius: Array) -> "Bonding":
+        """Return the readings of bonds that a contact carries: none after a step at whose start it was open.
+
+        ``radius`` is that of the contact at the start of the step [m], 0 or nan if it was open.
+        """
+        is_closed = np.nan_to_num(radius) > 0.0
+        return Bonding(*(values * is_closed for values in self))
+
 
 class Gammas(NamedTuple):
     """ΔΓ at amplitude 1 as a sum of independent gamma numbers; arrays of shape (terms,), empty where none is drawn.

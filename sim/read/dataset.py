@@ -505,12 +505,17 @@ def is_steady(dataset: xr.Dataset) -> bool:
 def is_stationary(dataset: xr.Dataset) -> bool:
     """True if the speed, or the force that pulls, and the contact's control are constant in time all over the sweep.
 
-    Under a force from which any trajectory runs away nothing is.
+    Nothing is if any trajectory runs away, nor behind a spring whose stage moves, also if the slider sticks.
     """
     is_driven = is_steady(dataset)
-    if not is_driven and {"drive_force", "runaway_time"} <= dataset.variables.keys():
-        borne = dataset["runaway_time"].isel(t=-1).isnull().all()
-        is_driven = bool(borne & (word(dataset, "drive.model", "") == "force").all())
+    if "runaway_time" in dataset.variables:
+        borne = bool(dataset["runaway_time"].isel(t=-1).isnull().all())
+        forced = (word(dataset, "drive.model", "") == "force").all()
+        by_force = "drive_force" in dataset.variables and bool(forced)
+        is_driven = borne and (is_driven or by_force)
+    if "stage_position" in dataset:
+        stage = dataset["stage_position"]
+        is_driven = is_driven and bool((stage == stage.isel(t=0)).all())
     return is_driven and bool(stays_held(dataset).all())
 
 

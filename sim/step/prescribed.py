@@ -38,6 +38,8 @@ class Prescribed(Stepper):
         bonds, bonding = population.advance(
             state.bonds, motions, state.contact.radius, noise.bonds
         )
+        if population.feeds_back:
+            bonding = bonding.carried(state.contact.radius)
         shear, energy = process.advance(state.shear, motions, bonding, noise.shear)
         balance = scene.work.balance(bonding, energy, motions.position)
         touch = contact.advance(state.contact, motions, scene.times.duration, balance)

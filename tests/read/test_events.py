@@ -363,6 +363,28 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
     assert_allclose(result["peak_friction_time"], result["peak_time"], rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "rupture",
+    [None, {"model": "cut_off", "rate": "1 1/s", "stretch": "5 nm"}],
+    ids=["bell", "cut_off"],
+)
+def test_the_time_of_a_peak_after_a_start_is_within_its_bound_of_that_at_fine_steps(
+    rupture,
+):
+    """Bonds carry adhesion, so that the contact area changes while the stress is at its maximum."""
+    scenario = sim.load(Path(__file__).parents[2] / "scenarios/static_peak.toml")
+    values = {"drive.rest": "1 s", "drive.speed": "3 um/s", "clock.duration": "1.1 s"}
+    if rupture:
+        values["bonds.rupture"] = rupture
+    coarse, fine = (
+        read.peaks(run(scenario.with_values(values | {"clock.step": step})))
+        for step in ("4 ms", "0.1 ms")
+    )
+    for name in ("peak_time", "peak_friction_time"):
+        off = abs(float(coarse[name].value) - float(fine[name].value))
+        assert 1e-6 < off < float(coarse[name].bound) == 4e-3
+
+
 @pytest.mark.parametrize("rounding", ["compression", "precision"])
 def test_rounded_records_make_no_peak_of_a_stress_that_falls_and_keep_a_true_one(
     rounding, tmp_path

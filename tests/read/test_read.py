@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers.lens import RADIUS, scene
-from helpers.parts import Equilibrium, Record, drive, read, run, shear
+from helpers.parts import Clock, Equilibrium, Record, bonds, drive, read, run, shear
 from helpers.printed import rows_of
 from helpers.statements import shares, statistics
 from numpy.testing import assert_allclose
@@ -228,6 +228,20 @@ def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_sta
     )
     moved = run(scene(contact=Equilibrium(load={"from": 1e-3, "to": 2e-3}), **steady))
     assert read.is_steady(moved) and not read.is_stationary(moved)
+    pulled = {"bonds": bonds.Steady(critical_speed=1e-2, stress=2e5)}
+    pulled |= {"shear": shear.Uniform(), "clock": Clock(duration=0.1, step=1e-2)}
+    spring = drive.Spring(
+        stage=1e-6, stiffness=10.0, damping=1.0, contact_stiffness="rigid"
+    )
+    stuck = run(scene(drive=spring, **pulled))
+    assert not stuck["speed"].any() and float(stuck["friction_force"][-1]) > 0.0
+    assert read.is_steady(stuck) and not read.is_stationary(stuck)
+    force = drive.Force(force=1e-4, damping=1.0, contact_stiffness="rigid")
+    borne = run(scene(drive=force, **pulled))
+    assert not borne["speed"].any() and read.is_stationary(borne)
+    # as if it ran away at the end
+    borne["runaway_time"][{"t": -1}] = 0.1
+    assert not read.is_stationary(borne)
 
 
 def test_events_of_a_version_with_other_definitions_are_left_out_with_one_sentence(

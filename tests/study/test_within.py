@@ -195,6 +195,15 @@ def _finest(scene, members):
     )
 
 
+def _uncertain(reference, target):
+    """Return the quantities of which four standard errors exceed a third of a target."""
+    return [
+        quantity
+        for quantity, (mean, sem) in reference.items()
+        if 4.0 * sem.max() > target * np.abs(mean).max() / 3.0
+    ]
+
+
 def judged(name):
     """Return whether the true error is within the target, for all targets and quantities of a scene.
 
@@ -203,12 +212,14 @@ def judged(name):
     scene, held = sim.load(accuracy_scene(name)), list[bool]()
     is_noisy = name in SPRINGS and scene.is_random
     is_wide = name in NAMED or scene.bonds.model == "tracked"
-    members = 20_000 if is_wide else 4096
-    reference = _means(_finest(scene, 512 if name in SPRINGS else members))
+    members = 512 if name in SPRINGS else 20_000 if is_wide else 4096
     targets = (0.05, 0.01, 0.003) if name in NAMED and not is_noisy else (0.05, 0.01)
+    reference = _means(_finest(scene, members))
+    while _uncertain(reference, min(targets)) and members < 4096:
+        members *= 2
+        reference = _means(_finest(scene, members))
+    assert _uncertain(reference, min(targets)) == [], name
     units = {quantity: np.abs(mean).max() for quantity, (mean, _) in reference.items()}
-    for quantity, (_, sem) in reference.items():
-        assert 4.0 * sem.max() <= min(targets) * units[quantity] / 3.0, (name, quantity)
     for target in targets:
         means = _means(answer(scene, Goal(target, (), 300.0)).scenario)
         for quantity, (mean, _) in reference.items():

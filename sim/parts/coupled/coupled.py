@@ -248,6 +248,8 @@ def advance(
     )
     loop = Loop(inputs, arguments, reached)
     end, bonding = bonds.advance(population, contact.radius, loop, noise)
+    if bonds.bonds.feeds_back:
+        bonding = bonding.carried(contact.radius)
     stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
         whole = pieces.joined

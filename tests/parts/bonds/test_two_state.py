@@ -18,9 +18,10 @@ from helpers.scenes import (
     scene,
     shear,
 )
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import binom
 
+import sim
 from sim.spectrum.families import BondMade
 
 STEPPED = drive.Table(
@@ -149,3 +150,39 @@ def test_the_depth_left_open_is_chosen_by_noise_rupture_and_the_number_of_sites(
     for tolerance, cohorts in [(0.5, 1e-4), (1e-2, 1e-4), (1e-4, 1e-5)]:
         auto = bonds.Auto(rupture=BELL, **STRETCHED, tolerance=tolerance)
         assert_allclose(scene(bonds=auto).population.tolerance, cohorts, rtol=1e-15)
+
+
+def test_a_contact_carries_no_bonds_while_it_is_open_and_jumps_in_without_them():
+    """Closed form of a free sphere that touches, a³ = 2π w R²/E* with the work of adhesion w without bonds."""
+    for step in ("1 ms", "4 ms"):
+        scenario = sim.load(
+            {
+                "clock": {"duration": "2 s", "step": step},
+                "solid": {"shear_modulus": "1 MPa"},
+                "sphere": {"radius": "2 mm"},
+                "adhesion": {"work": "40 mJ/m^2", "bond_share": 0.5},
+                "contact": {
+                    "model": "equilibrium",
+                    "indentation": {"from": "2 um", "to": "-5 um", "cycles": 1},
+                    "after_pull_off": "reattach",
+                },
+                "drive": {"model": "steady", "speed": "1 um/s"},
+                "bonds": {
+                    "model": "rate",
+                    "critical_speed": "10 um/s",
+                    "rebinding_rate": "20 1/s",
+                    "area": "carried",
+                },
+            }
+        )
+        dataset = sim.run(scenario)
+        radius, bound = (
+            dataset[name].values.ravel() for name in ("contact_radius", "bond_fraction")
+        )
+        opened, closed = np.flatnonzero(np.diff(1 * (radius > 0.0))) + 1
+        assert bound[0] > 0.9 and radius[-1] > 0.0
+        assert_array_equal(bound[opened + 1 : closed + 1], 0.0)
+        modulus = 2.0 * 1e6 / (1.0 - scenario.solid.poisson_ratio)
+        alone = (2.0 * math.pi * 20e-3 * 2e-3**2 / modulus) ** (1.0 / 3.0)
+        # the sphere is pressed further in the step in which it touches
+        assert alone <= radius[closed] < 1.03 * alone
