@@ -457,6 +457,10 @@ class Bonds(Part, Protocol[State]):
     def state_class(self) -> type[State]:
         """Class of the state."""
 
+    @property
+    def feeds_back(self) -> bool:
+        """True if the contact carries the bonds, so that a step needs the contact at the end of the step before."""
+
     def start(self, motion: Motion, noise: Noise) -> State:
         """Population at t = 0, as the key ``start`` has it."""
 
