@@ -167,7 +167,8 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
 
     Within a step the stage extends the spring by its displacement. A slip event and a stick phase begin and end
     at clock steps, in which the slider moves on at about its mean speed in the event. So does the span over which the
-    stage does work against friction.
+    stage does work against friction. A slip event is found to begin up to a step early, and to end up to two steps late
+    if it ends within the step in which it begins: such an event lasts for two steps.
     """
     step = setting(dataset, "clock.step")
     path = abs(speed_of(dataset)).max("t") * step
@@ -175,7 +176,7 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
     # the slider moves on in the steps at both ends of an event
     moved = path + 2.0 * step * amplitude / duration
     rise = setting(dataset, "drive.stiffness") * path
-    of_each = step + 0.0 * means["recurrence_time"].value
+    of_each = step + 0.0 * duration
     intervals = (dataset["slip_count_late"] - 1.0).where(
         dataset["slip_count_late"] > 1.0
     )
@@ -185,8 +186,8 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
         "force_drop": 2.0 * rise + 0.0 * means["force_drop"].value,
         "slip_amplitude": moved,
         "slip_spread": moved / amplitude,
-        "slip_duration": of_each,
-        "stick_duration": of_each,
+        "slip_duration": 2.0 * of_each,
+        "stick_duration": 3.0 * of_each,
         "recurrence_time": step / intervals,
         "kinetic_friction": means["force_drop"].value * step / span,
     }
