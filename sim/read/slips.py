@@ -193,26 +193,33 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
     }
 
 
-def unresolved_slips(dataset: xr.Dataset) -> list[str]:
-    """Return remarks on falls of the force that are no slip events, and on slip events that are hardly resolved."""
+def unresolved_slips(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
+    """Return remarks on falls of the force that are no slip events, and on slip events that are hardly resolved.
+
+    Each has the points of the sweep that it holds for.
+    """
     remarks = []
-    falls = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0)))
-    if bool((falls > 0.0).any()):
-        remarks.append(
+    falls = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0))) > 0.0
+    if bool(falls.any()):
+        text = (
             "the spring force falls by 0.3 of its largest value so far or more while the "
             "slider is faster than the stage, but less than ten times: this is no slip event; "
             "if the fall takes a few clock steps only, reduce clock.step"
         )
+        remarks.append((text, falls))
     # of a run without slips, or without single ones
     with contextlib.suppress(ValueError, KeyError):
         each, step = slips(dataset), setting(dataset, "clock.step")
-        share = (each["slip_speed"] * step / each["slip_amplitude"]).median()
-        if bool((share > _COARSE).any()):
-            remarks.append(
+        shares = each["slip_speed"] * step / each["slip_amplitude"]
+        of_slips = [dim for dim in (MEMBERS, "slip") if dim in shares.dims]
+        is_coarse = shares.median(of_slips) > _COARSE
+        if bool(is_coarse.any()):
+            text = (
                 f"the stage moves by more than {100.0 * _COARSE:g} % of a slip event in "
                 "a clock step: the drop of the spring force is off by about as much; "
                 "reduce clock.step"
             )
+            remarks.append((text, is_coarse))
     return remarks
 
 

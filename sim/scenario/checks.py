@@ -389,7 +389,7 @@ def _remark_on_unit(shear: Any, strength: float) -> list[str]:
     ]
 
 
-#: Clock step over the life of a bond in steady sliding from which on a peak of the friction is not shown, and a short one.
+#: Clock step over the life of a bond in steady sliding from which on no peak of the friction is shown, and a short one.
 _SHOWN, _RISE = 0.5, 0.1
 #: Mean overshoot of a random walk beyond a limit, over the standard deviation of its steps: −ζ(1/2)/√(2π).
 _OVERSHOOT = 0.5826
