@@ -173,7 +173,8 @@ def _add_step_errors(found: Estimates, dataset: xr.Dataset) -> None:
     found["pull_off_load"] = load._replace(bound=error)
     for name in {"total_dissipated", "loop_dissipation"} & found.keys():
         one = found[name]
-        bound = 2.0 * abs(error / load.value * one.value).fillna(0.0)
+        share = error / ensemble_mean(load.value)
+        bound = 2.0 * abs(share * ensemble_mean(one.value)).fillna(0.0)
         bound = bound if one.bound is None else bound + one.bound
         found[name] = one._replace(bound=bound.assign_attrs(source="step"))
 

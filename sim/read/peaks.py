@@ -26,6 +26,11 @@ from sim.units.notation import engineering
 
 #: Relative changes below it are rounding.
 _ROUNDING = 1e-6
+#: Clock steps after a start from rest in which the friction of stretched bonds has risen too fast to show its peak.
+_TOO_FAST = 1.5
+_UNRESOLVED = (
+    "the friction rises within a clock step, which may hide a peak; reduce clock.step"
+)
 #: Peaks, each with the quantity that it is of, and the beginning of the names of its time and speed.
 PEAKS = {
     "peak_stress": ("shear_stress", "peak"),
@@ -59,10 +64,12 @@ def peaks(dataset: xr.Dataset) -> Estimates:
     Notes
     -----
     Peaks are those of the clock steps, refined between them. nan where there is none: the value at the end of the run,
-    or on a ramp that at its start, is as large. A start may peak at once, when the stress falls from what it was at
-    rest. The time of a peak after a start is known to a clock step: that of the stress of bonds that are solved exactly
-    at a constant speed has a far smaller error, that of the friction, whose area is taken as linear in a step, a share
-    of a step, and that of bonds that jump or break at a limit is the time of a sample.
+    or on a ramp that at its start, is as large, within the tolerance of the bonds. A start may peak at once, when the
+    stress falls from what it was at rest. Stretched bonds have no stress at rest, so that a largest value at the first
+    clock step of the sliding is no peak: the step is too long to show how the friction rises. The time of a peak after
+    a start is known to a clock step: that of the stress of bonds that are solved exactly at a constant speed has a far
+    smaller error, that of the friction, whose area is taken as linear in a step, a share of a step, and that of bonds
+    that jump or break at a limit is the time of a sample.
     """
     dataset = plain(dataset)
     drive = word(dataset, "drive.model", "")
@@ -76,6 +83,9 @@ def peaks(dataset: xr.Dataset) -> Estimates:
         if phased
         else xr.DataArray(0.0)
     )
+    step = setting(dataset, "clock.step")
+    tolerance = _number_of(dataset, "bonds.tolerance", _ROUNDING).clip(_ROUNDING)
+    stretched = _number_of(dataset, "bonds.bond_stiffness", 0.0) > 0.0
     for name, (source, prefix) in PEAKS.items():
         if not {name, source} <= {*dataset} or differ(dataset[name]):
             continue
@@ -88,11 +98,13 @@ def peaks(dataset: xr.Dataset) -> Estimates:
             ]
         size, when, speed = read
         before, after = (
-            size / (1.0 + _ROUNDING) > ends.isel(t=k, drop=True) for k in (0, 1)
+            size / (1.0 + tolerance) > ends.isel(t=k, drop=True) for k in (0, 1)
         )
-        known = (ramp | start) & after & (~ramp | before)
         since = when - beginning
-        bounds = [setting(dataset, "clock.step"), xr.DataArray(0.0)]
+        is_hidden = start & stretched & (since < _TOO_FAST * step)
+        known = (ramp | start) & after & (~ramp | before) & ~is_hidden
+        reason = xr.where(is_hidden, _UNRESOLVED, "")
+        bounds = [step, xr.DataArray(0.0)]
         if bool(ramp.any()):
             late = _late_by_steps(dataset, when, speed)
             since = since - late.time.where(ramp, 0.0)
@@ -122,12 +134,19 @@ def peaks(dataset: xr.Dataset) -> Estimates:
         }
         for key, (values, bound, *described) in columns.items():
             values = labelled(values.where(known), *described)
-            one = Estimate(values)
+            one = Estimate(values, reason=reason)
             if bound is not None and bool((bound > 0.0).any()):
                 bound = bound.where(known).assign_attrs(source="step")
                 one = one._replace(bound=bound)
             result[key] = one.map(lambda each: each.drop_vars("phase", errors="ignore"))
     return result
+
+
+def _number_of(dataset: xr.Dataset, key: str, default: float) -> xr.DataArray:
+    """Return a number of the scenario by its dotted key, and the default where the scenario has none."""
+    with contextlib.suppress(KeyError):
+        return setting(dataset, key).fillna(default)
+    return xr.DataArray(default)
 
 
 class Late(NamedTuple):

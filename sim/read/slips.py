@@ -167,7 +167,8 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
 
     Within a step the stage extends the spring by its displacement. A slip event and a stick phase begin and end
     at clock steps, in which the slider moves on at about its mean speed in the event. So does the span over which the
-    stage does work against friction.
+    stage does work against friction. A slip event is found to begin up to a step early, and to end up to two steps late
+    if it ends within the step in which it begins: such an event lasts for two steps.
     """
     step = setting(dataset, "clock.step")
     path = abs(speed_of(dataset)).max("t") * step
@@ -175,7 +176,7 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
     # the slider moves on in the steps at both ends of an event
     moved = path + 2.0 * step * amplitude / duration
     rise = setting(dataset, "drive.stiffness") * path
-    of_each = step + 0.0 * means["recurrence_time"].value
+    of_each = step + 0.0 * duration
     intervals = (dataset["slip_count_late"] - 1.0).where(
         dataset["slip_count_late"] > 1.0
     )
@@ -185,33 +186,40 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
         "force_drop": 2.0 * rise + 0.0 * means["force_drop"].value,
         "slip_amplitude": moved,
         "slip_spread": moved / amplitude,
-        "slip_duration": of_each,
-        "stick_duration": of_each,
+        "slip_duration": 2.0 * of_each,
+        "stick_duration": 3.0 * of_each,
         "recurrence_time": step / intervals,
         "kinetic_friction": means["force_drop"].value * step / span,
     }
 
 
-def unresolved_slips(dataset: xr.Dataset) -> list[str]:
-    """Return remarks on falls of the force that are no slip events, and on slip events that are hardly resolved."""
+def unresolved_slips(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
+    """Return remarks on falls of the force that are no slip events, and on slip events that are hardly resolved.
+
+    Each has the points of the sweep that it holds for.
+    """
     remarks = []
-    falls = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0)))
-    if bool((falls > 0.0).any()):
-        remarks.append(
+    falls = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0))) > 0.0
+    if bool(falls.any()):
+        text = (
             "the spring force falls by 0.3 of its largest value so far or more while the "
             "slider is faster than the stage, but less than ten times: this is no slip event; "
             "if the fall takes a few clock steps only, reduce clock.step"
         )
+        remarks.append((text, falls))
     # of a run without slips, or without single ones
     with contextlib.suppress(ValueError, KeyError):
         each, step = slips(dataset), setting(dataset, "clock.step")
-        share = (each["slip_speed"] * step / each["slip_amplitude"]).median()
-        if bool((share > _COARSE).any()):
-            remarks.append(
+        shares = each["slip_speed"] * step / each["slip_amplitude"]
+        of_slips = [dim for dim in (MEMBERS, "slip") if dim in shares.dims]
+        is_coarse = shares.median(of_slips) > _COARSE
+        if bool(is_coarse.any()):
+            text = (
                 f"the stage moves by more than {100.0 * _COARSE:g} % of a slip event in "
                 "a clock step: the drop of the spring force is off by about as much; "
                 "reduce clock.step"
             )
+            remarks.append((text, is_coarse))
     return remarks
 
 

@@ -248,8 +248,10 @@ def tables_of(run: Run, rows: int = 12, show: Sequence[str] = ()) -> list[Table]
     """
     result = [table(run, rows, show)]
     if {"losses", "all"} & {*show}:
-        result.append(_over_rows(run, LOSSES, rows, len(LOSSES)))
-    result += [highlights(run, rows, show), losses(run, rows), phases(run, rows)]
+        by_mechanism = _over_rows(run, LOSSES, rows, math.inf)
+        # a scene without a loss has no column of it
+        result += [by_mechanism] if by_mechanism.columns else []
+    result += [each(run, rows, show) for each in (highlights, losses, phases)]
     result.append(spread(run))
     return [each_table for each_table in result if each_table.rows]
 
@@ -275,8 +277,7 @@ def table(run: Run, rows: int = 12, show: Sequence[str] = ()) -> Table:
         digits. Columns that are constant throughout (no friction, no open contacts) are
         left out.
     """
-    most = len(MAIN) if "all" in show else MOST
-    return _over_rows(run, main_columns(run), rows, most)
+    return _over_rows(run, main_columns(run), rows, _most(show, "all"))
 
 
 def main_columns(run: Run) -> tuple[Column, ...]:
@@ -298,13 +299,18 @@ def highlights(run: Run, rows: int = 12, show: Sequence[str] = ()) -> Table:
     columns = [column for column in EVENTS if _of_drive(run, column.name)]
     if {"slips", "all"} & {*show}:
         columns += SLIPS
-    most = len(columns) if show else MOST
+    most = math.inf if show else MOST
     return _once(run, run.events, columns, rows, most)
 
 
-def losses(run: Run, rows: int = 12) -> Table:
+def _most(show: Sequence[str], group: str) -> float:
+    """Return the number of columns that a table of a group has room for: all of them if a person asks for the group."""
+    return math.inf if {group, "all"} & {*show} else MOST
+
+
+def losses(run: Run, rows: int = 12, show: Sequence[str] = ()) -> Table:
     """Return the speeds of losses of area, with a row for each point of the sweep of other keys."""
-    return _once(run, run.losses, _of_losses_of(run), rows, MOST)
+    return _once(run, run.losses, _of_losses_of(run), rows, _most(show, "losses"))
 
 
 def _of_losses_of(run: Run) -> tuple[Column, ...]:
@@ -313,7 +319,7 @@ def _of_losses_of(run: Run) -> tuple[Column, ...]:
     return of_losses(run.losses, symbol)
 
 
-def phases(run: Run, rows: int = 12) -> Table:
+def phases(run: Run, rows: int = 12, show: Sequence[str] = ()) -> Table:
     """Return slip events and peaks in each phase of a course, with a row for each phase.
 
     If there are several holds, phases without a hold before and without a slip event are left out.
@@ -328,7 +334,7 @@ def phases(run: Run, rows: int = 12) -> Table:
                 slips = stated["phase_slip_count"].value > 0.0
                 known |= slips.any([dim for dim in slips.dims if dim != "phase"])
             stated = {name: stated[name].isel({"phase": known}) for name in names}
-    return _once(run, stated, PHASES, rows, MOST)
+    return _once(run, stated, PHASES, rows, _most(show, "slips"))
 
 
 def spread(run: Run) -> Table:
@@ -353,7 +359,7 @@ def spread(run: Run) -> Table:
     return Table(rows, keys=1, total=len(rows), reasons=memory.reasons)
 
 
-def _over_rows(run: Run, columns: Sequence[Column], rows: int, most: int) -> Table:
+def _over_rows(run: Run, columns: Sequence[Column], rows: int, most: float) -> Table:
     """Return the table of some columns over sweep and time."""
     means, points, places = _tabulated(run, rows, [column.name for column in columns])
     once = run.has_one_row_each
@@ -367,7 +373,7 @@ def _over_rows(run: Run, columns: Sequence[Column], rows: int, most: int) -> Tab
 
 
 def _once(
-    run: Run, stated: Estimates, columns: Sequence[Column], rows: int, most: int
+    run: Run, stated: Estimates, columns: Sequence[Column], rows: int, most: float
 ) -> Table:
     """Return a table of numbers of a whole run, a row for each point; no rows if there are none."""
     known = [stated[c.name].value for c in columns if c.name in stated]
@@ -399,14 +405,14 @@ def _defined(row: Definition, one: Estimate) -> Definition:
 
 
 def _fitting(
-    columns: Sequence[Column], most: int
+    columns: Sequence[Column], most: float
 ) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
     """Return the columns that a table has room for, and those that it leaves out."""
     kept = list(columns)
     for name in _LEFT_OUT_FIRST:
         if len(kept) > most:
             kept = [column for column in kept if column.name != name]
-    kept = kept[: max(most, 1)]
+    kept = kept if most == math.inf else kept[: max(int(most), 1)]
     return tuple(kept), tuple(column for column in columns if column not in kept)
 
 
@@ -444,7 +450,9 @@ def notes(run: Run, shown: Sequence[Table]) -> Notes:
         # that of the load at pull-off stands beside it
         if error.matters and error.name != "pull_off_error"
     ]
-    needed += unresolved_slips(run.dataset)
+    needed += [
+        f"{text}{_at_points(run, at)}" for text, at in unresolved_slips(run.dataset)
+    ]
     further = [*_turning(run)] if run.has_one_row_each else []
     further += [
         f"{len(each_table.rows)} of {each_table.total} rows shown; see --all, --csv FILE and --where KEY=VALUE"
@@ -565,11 +573,29 @@ def _missing(shown: Sequence[Table]) -> Iterator[str]:
     for (heading, _), entries in alike.items():
         places = tuple(dict.fromkeys(reason.place for reason in entries))
         affected.setdefault((entries[0].text, places), []).append(heading)
-    for (text, (first, *others)), headings in affected.items():
-        points = "points" if len(others) > 1 else "point"
-        more = f", and {len(others)} more {points}" if others else ""
-        at = f" (at {first}{more})" if first else ""
-        yield f"* {', '.join(headings)}: {text}{at}"
+    for (text, words), headings in affected.items():
+        yield f"* {', '.join(headings)}: {text}{_first_of(words)}"
+
+
+def _first_of(points: Sequence[str]) -> str:
+    """Return the first of some points in words, and the number of the others, as the end of a sentence."""
+    first, *others = points
+    more = f", and {len(others)} more point{'s' * (len(others) > 1)}" if others else ""
+    return f" (at {first}{more})" if first else ""
+
+
+def _at_points(run: Run, holds: xr.DataArray) -> str:
+    """Return the points of the sweep at which something holds of some member, "" if it holds at all of them."""
+    holds = holds.any([dim for dim in holds.dims if dim not in run.sweep])
+    if bool(holds.all()):
+        return ""
+    indices = np.nonzero(holds.to_numpy())
+    points = {
+        str(dim): xr.Variable("row", index)
+        for dim, index in zip(holds.dims, indices, strict=True)
+    }
+    places = {name: run.dataset[name] for name in points}
+    return _first_of(_in_words(places, points, len(indices[0])))
 
 
 def _turning(run: Run) -> Iterator[str]:

@@ -13,6 +13,7 @@ from sim.laws.layer_table import WIDEST
 from sim.laws.limits import DISTANCES, JKR_FROM, elastocapillary_length, tabor_number
 from sim.parts.bonds.models import Demands
 from sim.parts.exchange import Array
+from sim.step.phases import phases
 from sim.units.notation import engineering
 
 _STEPS_A_CYCLE = 2
@@ -373,6 +374,7 @@ def remarks_between(scene: Scene) -> list[str]:
     return [
         *remarks,
         *_remarks_on_step(scene, np.array([np.abs(speeds).max() * scene.clock.step])),
+        *_remark_on_rise(scene),
     ]
 
 
@@ -387,6 +389,8 @@ def _remark_on_unit(shear: Any, strength: float) -> list[str]:
     ]
 
 
+#: Clock step over the life of a bond in steady sliding from which on no peak of the friction is shown, and a short one.
+_SHOWN, _RISE = 0.5, 0.1
 #: Mean overshoot of a random walk beyond a limit, over the standard deviation of its steps: −ζ(1/2)/√(2π).
 _OVERSHOOT = 0.5826
 #: Share of the variance of ΔΓ that a step may renew: a contact under tension lets go late by a tenth of the scatter of
@@ -446,7 +450,7 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
 
 def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
     """Return a remark if a clock step in which a path [m] is slid is too long, with one that is not."""
-    between, slid = scene.clock.step * scene.clock.stride, path[0]
+    slid = path[0]
     if scene.feels_steps:
         gone = -math.log1p(-min(renewed(scene, path)[0], 0.999))
         share = -math.log1p(
@@ -463,15 +467,59 @@ def _remarks_on_step(scene: Scene, path: Array) -> list[str]:
         text = f"a clock step slides {engineering(slid, 'm')}, more than a pixel of the map: the contact skips pixels"
     else:
         return []
-    if share >= 1.0:
-        return []
-    least = scene.clock.stride / share
+    return [f"{text}; {_finer(scene, share)}"] if share < 1.0 else []
+
+
+def _finer(scene: Scene, share: float) -> str:
+    """Return the cure of a clock step of which this share at most is short enough."""
+    between, least = scene.clock.step * scene.clock.stride, scene.clock.stride / share
     count = next(
         count
         for k in range(99)
         for count in (10**k, 2 * 10**k, 5 * 10**k)
         if count >= least
     )
+    step = engineering(between / count, "s").replace("µ", "u")
+    return f'give clock.step = "{step}"'
+
+
+def _remark_on_rise(scene: Scene) -> list[str]:
+    """Return a remark if friction rises from rest within a clock step, because its peak is then not seen.
+
+    Bonds that form without a stretch bear their steady stress after about the life of a bond.
+    """
+    drive, bonds, clock = scene.drive, scene.population, scene.clock
+    if drive.solves_motion or not (bonds.stretched and bonds.rebinding_rate > 0.0):
+        return []
+    course = phases(drive, scene.contact, scene.times)
+    unstretched = (bonds.start_from != "steady", *course.rests)
+    begins = [
+        start
+        for start, before, rests in zip(
+            course.starts, unstretched, course.rests, strict=False
+        )
+        if before and not rests
+    ]
+    if not begins:
+        return []
+    ends = np.array([[start, start + clock.step] for start in begins]).clip(
+        max=clock.duration
+    )
+    paths = [
+        drive.pieces(pair, clock.duration).joined.integral.sum()
+        for pair in ends
+        if pair[1] > pair[0]
+    ]
+    speeds = np.abs(np.array(paths)) / clock.step
+    lives = bonds.life(bonds.steady(speeds).fraction)
+    place = int(np.argmin(lives))
+    if clock.step <= _SHOWN * lives[place]:
+        return []
+    life, speed = (
+        engineering(float(values[place]), unit)
+        for values, unit in ((lives, "s"), (speeds, "m/s"))
+    )
     return [
-        f'{text}; give clock.step = "{engineering(between / count, "s").replace("µ", "u")}"'
+        f"friction rises from rest, and may pass a peak, within about the life of a bond, {life} at {speed}, which"
+        f" clock.step is too long to show; {_finer(scene, _RISE * lives[place] / clock.step)}"
     ]

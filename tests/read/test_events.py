@@ -30,7 +30,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import sim
-from sim.laws.schallamach import bell_peak
+from sim.laws.schallamach import bell_peak, start_up_peak
 from sim.quantities import OPEN_THROUGHOUT, STAYS_CLOSED
 from sim.read.peaks import ensemble_peaks, static_threshold
 from sim.read.tables import key_figures, notes, tables_of
@@ -549,6 +549,36 @@ def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_t
         values_of(static_threshold(seldom)), values_of(static_threshold(dense))
     )
     assert bool(values_of(static_threshold(short)).to_dataarray().isnull().all())
+
+
+@pytest.mark.parametrize(("step", "is_seen"), [(1e-5, True), (5e-2, False)])
+def test_a_clock_step_that_hides_the_peak_of_a_start_states_no_peak_and_a_cure(
+    step, is_seen
+):
+    """Bonds that have aged break within some milliseconds of sliding, of which a long step shows the end alone."""
+    population = bonds.Cohort(
+        rupture=Bell(zero_force_rate=25.0, bell_force=4e-12),
+        bond_stiffness=8e-7,
+        rebinding_rate=250.0,
+        site_density=6.5e16,
+    )
+    made = scene(
+        shear=shear.Uniform(),
+        bonds=population,
+        drive=drive.Start(rest=0.1, speed=20e-3),
+        clock=Clock(0.3, step),
+    )
+    dataset = run(made)
+    peak = read.peaks(dataset)["peak_stress"]
+    assert bool(np.isfinite(peak.value)) is is_seen
+    assert ("clock.step" in str(peak.reason.values)) is not is_seen
+    cures = [text for text in made.remarks() if "rises from rest" in text]
+    assert len(cures) == (not is_seen) and all("clock.step" in text for text in cures)
+    if is_seen:
+        # more than that of the bonds of the start alone, because some others form meanwhile
+        force = start_up_peak(20e-3, 25.0, 4e-12, 8e-7).force
+        alone = 6.5e16 * population.bound_at_rest * force
+        assert alone < float(peak.value) < 1.1 * alone
 
 
 @pytest.mark.parametrize(("peaks", "start"), [(True, "empty"), (False, "steady")])

@@ -417,6 +417,22 @@ def test_the_time_of_a_pull_off_has_no_mean_if_it_comes_after_the_run_in_some_me
     assert "every member" in str(statements["pull_off_time"].reason.values)
 
 
+def test_recorded_statistics_of_a_mount_have_the_energies_and_bounds_of_their_members():
+    contact, tables, _ = PAIRS["held grips and fluctuations"]
+    every, pooled = (
+        ran(LENS, contact, **tables, record={"per_member": per_member})
+        for per_member in (True, False)
+    )
+    assert bool(every["pull_off_load"].notnull().all())
+    of_members, recorded = statistics(every), statistics(pooled)
+    for name in ("pull_off_load", "total_dissipated"):
+        assert_allclose(recorded[name].value, of_members[name].value, rtol=1e-12)
+        assert recorded[name].bound.dims == ()
+        # of the mean load instead of the mean over the loads
+        assert_allclose(recorded[name].bound, of_members[name].bound, rtol=0.05)
+    assert len(sim.stats(pooled))
+
+
 def test_the_share_that_is_left_has_the_survival_and_the_interval_of_scipy():
     contact, tables, _ = PAIRS["a held load and fluctuations"]
     dataset = ran(LENS, contact, **tables)

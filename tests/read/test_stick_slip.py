@@ -309,6 +309,14 @@ def test_a_force_that_falls_while_the_slider_is_hardly_faster_than_the_stage_is_
     assert any("is no slip event" in line for line in lines) is is_named
 
 
+def test_a_slow_fall_of_the_force_is_named_with_the_point_of_the_sweep_that_has_it():
+    slow = {"drive": PULLED["drive"] | {"stage": "3 mm/s"}}
+    sweep = {"sweep": {"drive.mass": ["50 mg", "5 g"]}}
+    lines = lines_of(run(sim.Scenario(**PULLED | slow | sweep)))
+    named = [line for line in lines if "no slip event;" in line]
+    assert len(named) == 1 and named[0].endswith("(at drive_mass = 0.005 kg)")
+
+
 @pytest.mark.parametrize("record", ["3.2 ms", "1.2 s"])
 def test_the_records_of_a_run_do_not_change_its_slip_events(record):
     clock = PULLED["clock"] | {"record": record}

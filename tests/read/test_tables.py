@@ -121,6 +121,19 @@ def of(long, quantity):
     return long[long["quantity"] == quantity]
 
 
+def test_all_columns_leave_none_out_and_print_no_table_without_columns():
+    swept = {"contact.load": [1e-3, 4e-3], "solid.shear_modulus": [1e6, 2e6]}
+    lags = {"model": "rate_dependent", "front_speed": "0.1 mm/s", "reversible": 0.01}
+    field = {"model": "mean", "spectrum": lens.FIELD["spectrum"]}
+    lost = scene(contact=lags | {"load": 4e-3}, shear=field, sweep=swept)
+    several = read.tables_of(sim.Run(run(lost)), show=["all"])
+    assert max(len(each_table.columns) for each_table in several) > 6
+    assert not any(each_table.left_out for each_table in several)
+    still = scene(bonds=bonds.Unbroken(stress=1e5), shear=shear.Uniform())
+    shown = read.tables_of(sim.Run(run(still)), show=["all"])
+    assert shown and all(each_table.columns for each_table in shown)
+
+
 def test_csv_reads_back_as_the_statistics_of_each_point_and_time(ramp, long, tmp_path):
     result, rows = statistics(ramp), of(long, "contact_radius")
     names = {"mean": "value", "error": "sem", "low": "low", "high": "high"}

@@ -608,6 +608,11 @@ class _Stretched(_BondModel):
             else 1.0
         )
 
+    def life(self, fraction: Array) -> Array:
+        """Return the mean life of a bond in steady sliding at bond fractions [s], at a positive rate of rebinding."""
+        bound = self.bound_at_rest * fraction
+        return np.asarray(bound / (1.0 - bound) / self.rebinding_rate)
+
     def remarks(self, setting: Setting) -> list[str]:
         number = 1.0 / self.bound_at_rest
         times = f"{number:.3g} times the bonds at rest"
