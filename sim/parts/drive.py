@@ -41,6 +41,8 @@ class _Sliding(Part):
     state_class: ClassVar[type[Slider]] = Slider
     #: True if the motion follows from the friction and is solved together with the bonds.
     solves_motion: ClassVar[bool] = False
+    #: Tangential forces among which is the largest of a run, if the force is prescribed and not the motion [N].
+    forces: ClassVar[tuple[float, ...]] = ()
 
     def faults(self, is_stretched: bool, is_reversible: bool) -> dict[str, str]:
         """Return faults of this drive, as ``_Driven.faults``: none, as it does not feel the friction."""
@@ -303,6 +305,7 @@ class _Driven(Part):
 
     state_class: ClassVar[type[Driven]] = Driven
     solves_motion: ClassVar[bool] = True
+    forces: ClassVar[tuple[float, ...]] = ()
 
     mass: Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)] = 0.0
     damping: Annotated[
@@ -436,6 +439,10 @@ class Force(_Driven):
 
     force: tables.over_time(Quantity("N", "tangential force on the body", "Q"), "force")  # type: ignore[valid-type]
     model: Literal["force"] = "force"
+
+    @property
+    def forces(self) -> tuple[float, ...]:  # type: ignore[override]
+        return self.course.extremes
 
     @property
     def course(self) -> tables.Prescribed:
