@@ -2,6 +2,7 @@
 
 import contextlib
 
+import numpy as np
 import xarray as xr
 
 from sim.quantities import SLIP_EVENT
@@ -19,6 +20,7 @@ from sim.read.dataset import (
 from sim.read.estimate import Estimate, Estimates, of_every_member
 from sim.read.observables import defined, labelled, share_of_members
 from sim.read.statistics import summary
+from sim.units.notation import engineering
 
 #: Path of the stage in a clock step over the advance in a slip event, above which the event is not resolved.
 _COARSE = 0.02
@@ -192,15 +194,41 @@ def _of_late_slips(dataset: xr.Dataset, means: Estimates) -> dict[str, xr.DataAr
     }
 
 
+def _points_of(affected: xr.DataArray) -> str:
+    """Return the points of a sweep at which something happens in words; "" if it happens at all of them."""
+    sizes = [name for name in affected.dims if name != MEMBERS]
+    if MEMBERS in affected.dims:
+        affected = affected.any(MEMBERS)
+    count = int(affected.sum())
+    if count == affected.size or not sizes:
+        return ""
+    first = np.unravel_index(int(np.argmax(affected.to_numpy())), affected.shape)
+    words = []
+    for name, place in zip(affected.dims, first, strict=True):
+        value = affected[name][int(place)]
+        is_number = value.dtype.kind == "f"
+        text = (
+            engineering(float(value), value.attrs.get("units", "1"))
+            if is_number
+            else str(value.item())
+        )
+        words.append(f"{name} = {text}")
+    return f" (at {', '.join(words)}, {count} of {affected.size} points)"
+
+
 def unresolved_slips(dataset: xr.Dataset) -> list[str]:
     """Return remarks on falls of the force that are no slip events, and on slip events that are hardly resolved."""
     remarks = []
     falls = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0)))
     if bool((falls > 0.0).any()):
+        most, at = float(falls.max()), _points_of(falls > 0.0)
+        number = "once" if most == 1.0 else f"{most:.3g} times"
+        if float(falls.where(falls > 0.0).min()) < most:
+            number = f"up to {number}"
         remarks.append(
-            "the spring force falls by 0.3 of its largest value so far or more while the "
-            "slider is faster than the stage, but less than ten times: this is no slip event; "
-            "if the fall takes a few clock steps only, reduce clock.step"
+            f"{number}{at} the spring force falls by 0.3 or more of its largest value since the slip event before or "
+            "the last turn of the stage, while the slider is faster than the stage, but less than ten times: this is "
+            "no slip event; if the fall takes a few clock steps only, reduce clock.step"
         )
     # of a run without slips, or without single ones
     with contextlib.suppress(ValueError, KeyError):

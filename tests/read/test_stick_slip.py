@@ -309,6 +309,19 @@ def test_a_force_that_falls_while_the_slider_is_hardly_faster_than_the_stage_is_
     assert any("is no slip event" in line for line in lines) is is_named
 
 
+def test_falls_that_are_no_slip_events_are_named_with_their_number_and_their_points():
+    drive = PULLED["drive"] | {"stage": "3 mm/s"}
+    sweep = {"drive.mass": ["5 g", "50 mg"]}
+    dataset = run(sim.Scenario(**PULLED | {"drive": drive, "sweep": sweep}))
+    (line,) = {line for line in lines_of(dataset) if "this is no slip event" in line}
+    number = int(dataset["slow_fall_count"].max())
+    assert int(dataset["slow_fall_count"].min()) == 0
+    assert line.startswith(f"{number} times (at drive_mass = 0.005 kg, 1 of 2 points) ")
+    heavy = dataset.isel(drive_mass=0)
+    (line,) = {line for line in lines_of(heavy) if "this is no slip event" in line}
+    assert line.startswith(f"{number} times the spring force")
+
+
 @pytest.mark.parametrize("record", ["3.2 ms", "1.2 s"])
 def test_the_records_of_a_run_do_not_change_its_slip_events(record):
     clock = PULLED["clock"] | {"record": record}
