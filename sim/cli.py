@@ -526,7 +526,8 @@ _KINDS = {
     "stress": "Shear stress and bonds over speed, with each maximum; of a start, over time. --data",
     "stability": "Force amplitude of the spring over speed and stiffness, at increasing and decreasing speed,"
     " with theory.",
-    "creep": "Displacement and speed of the slider over time under a prescribed force. A cross marks a runaway. --data",
+    "creep": "Displacement and speed of the slider over time under a prescribed force. A dotted line marks a"
+    " runaway. --data",
     "holds": "Friction peak after a hold over the time held, with its growth per decade or the time after which it"
     " saturates.",
     "friction": "Friction force over time and over the slider's position. --data",

@@ -171,3 +171,45 @@ def test_a_run_that_ends_before_the_last_peak_is_remarked():
     for duration, is_short in ((changes, True), ({"sweep": {}}, False)):
         text = str(sim.check(sim.load("scenarios/slide_hold_slide.toml", duration)))
         assert ("48.41 s or more" in text) is is_short
+
+
+@pytest.mark.parametrize("duration", ["1.5 s", "2.2 s", "2.25 s", "2.6 s", "3.25 s"])
+def test_a_run_that_has_the_peak_after_the_last_hold_is_not_said_to_end_before_it(
+    duration,
+):
+    stage = {"speed": "0.2 mm/s", "slide": "1 s", "holds": ["50 ms", "0.2 s"]}
+    dataset = sim.run(
+        {
+            "clock": {"duration": duration, "step": "5 ms"},
+            "solid": {"shear_modulus": "1.6 MPa"},
+            "sphere": {"radius": "2 mm"},
+            "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.0},
+            "contact": {"load": "4 mN"},
+            "drive": {
+                "model": "spring",
+                "stage": stage,
+                "stiffness": "2 kN/m",
+                "damping": 1.0,
+            },
+            "bonds": {
+                "model": "rate",
+                "rupture": {
+                    "model": "bell",
+                    "zero_force_rate": 0.5,
+                    "bell_force": "4 pN",
+                },
+                "bond_stiffness": "0.8 uN/m",
+                "rebinding_rate": 2.0,
+                "site_density": "6.5e16 1/m^2",
+            },
+        }
+    )
+    held = read.peaks_after_holds(dataset)
+    has_peak = "peak_after_hold" in held and bool(
+        (held["peak_after_hold"].notnull() & (held["time_held"] > 0.1)).any()
+    )
+    remarks = [text for text in read.remarks(dataset) if "clock.duration" in text]
+    assert has_peak == (duration in ("2.6 s", "3.25 s"))
+    assert len(remarks) == (duration != "3.25 s")
+    assert all("3.25 s" in text for text in remarks)
+    assert all(("before" in text) != has_peak for text in remarks)

@@ -371,8 +371,11 @@ def _largest_losses(plan: Plan, closed: Sequence[int]) -> Iterator[str]:
             loss.waves for loss in losses
         ],
     }
-    if all(point.contact.takes_mean_stress for point in points):
-        columns["the mean stress if contact.reversible = 1"] = [
+    # a prescribed force has no speed of steady sliding that is known before the run
+    if all(
+        point.contact.takes_mean_stress and not point.drive.forces for point in points
+    ):
+        columns["the mean stress of steady sliding if contact.reversible = 1"] = [
             np.nanmax(loss.mean_stress, keepdims=True) for loss in losses
         ]
     by_size: dict[str, list[str]] = {}

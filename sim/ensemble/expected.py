@@ -15,6 +15,8 @@ from sim.scenario.scenario import Scenario
 TIMES, _ENERGIES, _ON_DISC = 21, 256, 32
 #: Energies among which the one that masks a contact is searched, and the largest of them in standard deviations.
 _SEARCHED, _LARGEST = 33, 12.0
+#: Loss of area below which there is none but of rounding [1].
+_ROUNDING = 1e-9
 
 
 class StoredEnergy(NamedTuple):
@@ -216,6 +218,7 @@ def largest_losses(point: Scenario) -> LargestLosses:
         reversible = changed(point, changes)
         left.append(steady_course(reversible, times, speeds, np.zeros(1)).radius)
     losses = [1.0 - (np.nan_to_num(radius) / full)[:, 0] ** 2 for radius in left]
+    losses = [np.where(np.abs(loss) < _ROUNDING, 0.0, loss) for loss in losses]
     if not point.contact.takes_mean_stress:
         losses.append(np.full(losses[0].shape, np.nan))
     return LargestLosses(*losses)

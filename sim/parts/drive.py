@@ -41,6 +41,8 @@ class _Sliding(Part):
     state_class: ClassVar[type[Slider]] = Slider
     #: True if the motion follows from the friction and is solved together with the bonds.
     solves_motion: ClassVar[bool] = False
+    #: Tangential forces among which is the largest of a run, if the force is prescribed and not the motion [N].
+    forces: ClassVar[tuple[float, ...]] = ()
 
     def faults(self, is_stretched: bool, is_reversible: bool) -> dict[str, str]:
         """Return faults of this drive, as ``_Driven.faults``: none, as it does not feel the friction."""
@@ -191,13 +193,15 @@ class Table(tables.Table, _Sliding):
     model: Literal["table"] = "table"
 
 
-def _too_few_holds(lasts: float, setting: Setting) -> list[str]:
-    """Return a remark if a run ends before the time at which the slider has slid after the last hold [s]."""
-    if setting.times.duration >= lasts * (1.0 - 1e-9):
+def _too_few_holds(course: tables.Holds, first: float, setting: Setting) -> list[str]:
+    """Return a remark if a run ends before the slider has slid after the last hold of a course from a time on [s]."""
+    lasts, duration = first + course.lasts, setting.times.duration
+    if duration >= lasts * (1.0 - 1e-9):
         return []
-    return [
-        f"the run ends before the last hold has its peak: set clock.duration to {lasts:.6g} s or more"
-    ]
+    ends = "while the last hold lasts or before, so that its peak is missing"
+    if duration > (lasts - course.slide) * (1.0 + 1e-9):
+        ends = "while the slider slides after the last hold, whose peak is missing if it comes later"
+    return [f"the run ends {ends}: set clock.duration to {lasts:.6g} s or more"]
 
 
 @keyed(kw_only=True)
@@ -212,7 +216,7 @@ class Holds(tables.Holds, _Sliding):
     model: Literal["holds"] = "holds"
 
     def remarks(self, setting: Setting) -> list[str]:
-        return _too_few_holds(self.lasts, setting)
+        return _too_few_holds(self, 0.0, setting)
 
 
 _Tolerance = Annotated[
@@ -303,6 +307,7 @@ class _Driven(Part):
 
     state_class: ClassVar[type[Driven]] = Driven
     solves_motion: ClassVar[bool] = True
+    forces: ClassVar[tuple[float, ...]] = ()
 
     mass: Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)] = 0.0
     damping: Annotated[
@@ -438,6 +443,10 @@ class Force(_Driven):
     model: Literal["force"] = "force"
 
     @property
+    def forces(self) -> tuple[float, ...]:  # type: ignore[override]
+        return self.course.extremes
+
+    @property
     def course(self) -> tables.Prescribed:
         return tables.prescribed(self.force)
 
@@ -498,7 +507,9 @@ class Spring(_Driven):
         return self.start_after + self.course.end
 
     def remarks(self, setting: Setting) -> list[str]:
-        return _too_few_holds(self.start_after + self.course.lasts, setting)
+        if not isinstance(self.stage, StageHolds):
+            return []
+        return _too_few_holds(self.stage, self.start_after, setting)
 
     @cached_property
     def in_holds(self) -> _Driven:  # type: ignore[override]

@@ -23,7 +23,7 @@ from sim.plots.curves import (
 )
 from sim.plots.measured import Line, Measured
 from sim.read import Run, control, is_steady, peaks_after_holds, setting, sweep_dims
-from sim.read.dataset import MEMBERS, stays_held, word
+from sim.read.dataset import MEMBERS, ensemble_mean, stays_held, word
 from sim.read.events import incipient_law
 from sim.read.observables import with_slips
 from sim.read.over_speed import speed_dim
@@ -77,7 +77,7 @@ def needs_force(dataset: xr.Dataset) -> None:
 
 
 def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
-    """Displacement and speed of the slider over time under a prescribed force. A cross marks a runaway."""
+    """Displacement and speed of the slider over time under a prescribed force. A dotted line marks a runaway."""
     later = with_slips(dataset).isel(t=slice(1, None))
     scene = scene_along(later, "t")._replace(measured=data)
     scene = scene.placed(
@@ -90,14 +90,30 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     figure, axes = stacked(scene, [(1.8, position), (1.6, speed)])
     for panel in axes[:2]:
         style.upward(panel)
-        for drawn in [*panel.lines]:
-            points = np.asarray(drawn.get_xydata())
-            known = points[np.isfinite(points[:, 1])]
-            if 0 < len(known) < len(points):
-                look: Any = {"color": drawn.get_color(), "markersize": 4}
-                panel.plot(*known[-1], "x", label="runaway", **look)
+        _mark_runaways(panel, scene, dataset)
     style.legend(axes[0], scene.title)
     return figure
+
+
+def _mark_runaways(panel: Axes, scene: Scene, dataset: xr.Dataset) -> None:
+    """Draw the time of each runaway, the first one of several members, which the stepper records between records."""
+    if "runaway_time" not in dataset:
+        return
+    first = ensemble_mean(dataset["runaway_time"].isel(t=-1, drop=True))
+    if MEMBERS in first.dims:
+        first = first.min(MEMBERS)
+    for line in scene.lines:
+        time = scene.unit.factor * float(first.isel(line.point, missing_dims="ignore"))
+        if not np.isfinite(time):
+            continue
+        label = "runaway" if MEMBERS not in dataset.dims else "first runaway"
+        if not np.any(np.isfinite(scene.values("speed", line))):
+            # a motion that ends before the second record has no curve
+            label = f"{line.label}: {label}"
+        panel.axvline(
+            time, color=line.colour, linestyle=":", linewidth=1.0, label=label
+        )
+        panel.set_xlim(left=min(panel.get_xlim()[0], 0.8 * time))
 
 
 def needs_map(dataset: xr.Dataset) -> None:

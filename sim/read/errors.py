@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.read.dataset import sweep_dims
+from sim.read.dataset import ensemble_mean, sweep_dims
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 
@@ -21,6 +21,8 @@ _SOURCES = {
     "step": "the clock step",
     "pull": "the clock step",
 }
+#: Bound of the error of the load at pull-off.
+_PULL_OFF = "pull_off_error"
 
 
 class SystematicError(NamedTuple):
@@ -49,6 +51,8 @@ class SystematicError(NamedTuple):
             f" at {self.where}" if self.where else "",
             f"; cure: {self.cure}" if self.cure else "",
         )
+        if self.name == _PULL_OFF:
+            size = f"up to {size} to the load at pull-off"
         return f"{_SOURCES[self.name.partition('_')[0]]} adds {size}{place}{cure}"
 
 
@@ -64,11 +68,17 @@ def systematic_errors(dataset: xr.Dataset) -> list[SystematicError]:
         for source in ("cell", "banded", "step")
         if recorded.get(of, of) in dataset
     ]
-    known = [name for name in (*names, "pull_off_error") if name in dataset]
+    if {_PULL_OFF, "pull_off_time"} <= {*dataset}:
+        # a contact that stays closed has no load at pull-off
+        names.append(_PULL_OFF)
+        happened = ensemble_mean(dataset["pull_off_time"]).notnull()
+        others = {*happened.dims} - {*dataset[_PULL_OFF].dims}
+        happened = happened.any([*others])
+        dataset = dataset.assign({_PULL_OFF: dataset[_PULL_OFF].where(happened)})
     return [
         _largest(dataset, name)
-        for name in known
-        if bool((abs(dataset[name]) > 0.0).any())
+        for name in names
+        if name in dataset and bool((abs(dataset[name]) > 0.0).any())
     ]
 
 

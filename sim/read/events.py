@@ -171,6 +171,13 @@ def _add_step_errors(found: Estimates, dataset: xr.Dataset) -> None:
     error = abs(ensemble_mean(dataset["pull_off_error"])).assign_attrs(source="step")
     load = found["pull_off_load"]
     found["pull_off_load"] = load._replace(bound=error)
+    if "lowest_load" in found:
+        lowest = found["lowest_load"]
+        # the lowest load of a contact that is stable beyond it is another quantity
+        of_pull_off = error.where(lowest.value == load.value)
+        found["lowest_load"] = lowest._replace(
+            bound=of_pull_off.assign_attrs(source="step")
+        )
     for name in {"total_dissipated", "loop_dissipation"} & found.keys():
         one = found[name]
         share = error / ensemble_mean(load.value)

@@ -129,8 +129,8 @@ def mean_loops(dataset: xr.Dataset) -> Estimates:
     """Return the means over the cycles of ``loop_energy``, with bounds; with a reason if the records are too few.
 
     The bound is the sum of the changes if every second and every fourth record is left:
-    one change alone may vanish by chance. A contact that opens or closes adds half of the
-    load times the displacement between its two records.
+    one change alone may vanish by chance. A contact that opens or closes adds what its load
+    between the two records may differ from a straight line.
     """
     means = loop_energy(dataset).mean("cycle", keep_attrs=True)
     cycles = cycles_of(dataset)
@@ -148,14 +148,31 @@ def mean_loops(dataset: xr.Dataset) -> Estimates:
         for step in (2, 4)
     ]
     bounds = abs(means - xr.concat(thinned, "step")).sum("step", skipna=False)
-    read = ("normal_load", "displacement", "in_contact")
-    load, displacement, closed = dataset[[*read]].astype(float).diff("t").values()
-    boxes = abs(load * displacement).where(closed != 0.0, 0.0)
-    bounds["loop_energy"] = bounds["loop_energy"] + 0.5 * boxes.sum("t") / cycles
+    bounds["loop_energy"] = bounds["loop_energy"] + _of_jumps(dataset) / cycles
     for name, bound in bounds.items():
         bound = bound.where(is_fine).assign_attrs(source="records")
         found[str(name)] = found[str(name)]._replace(bound=bound)
     return found
+
+
+def _of_jumps(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the most work that a straight line misses between records at which a contact opens or closes [J].
+
+    The load there lies between the larger of both readings and the lowest load of the run, which the stepper records.
+    """
+    load = dataset["normal_load"].astype(float)
+    displacement, closed = (
+        dataset[name].astype(float).diff("t") for name in ("displacement", "in_contact")
+    )
+    before, after = (
+        load.isel(t=slice(None, -1)).drop_vars("t"),
+        load.isel(t=slice(1, None)),
+    )
+    before = before.assign_coords(t=after["t"])
+    straight, largest = 0.5 * (before + after), np.fmax(before, after)
+    lowest = np.fmin(np.fmin(before, after), dataset.get("lowest_load", load.min("t")))
+    off = np.fmax(largest - straight, straight - lowest) * abs(displacement)
+    return off.where(closed != 0.0, 0.0).sum("t")
 
 
 def cycles_of(dataset: xr.Dataset) -> xr.DataArray:

@@ -155,6 +155,25 @@ def closed_only(dataset: xr.Dataset) -> xr.Dataset:
     return dataset.assign(result)
 
 
+def too_few_closed(dataset: xr.Dataset) -> xr.DataArray | None:
+    """Return why closed contacts have no mean, where one or two of several are left; "" elsewhere, None without any."""
+    if "in_contact" not in dataset:
+        return None
+    closed = dataset["in_contact"]
+    if only_statistics(dataset):
+        members = int(dataset.attrs["members"])
+        count = (members * ensemble_mean(closed)).round()
+    elif MEMBERS in closed.dims:
+        members, count = closed.sizes[MEMBERS], (closed > 0.0).sum(MEMBERS)
+    else:
+        return None
+    reason = xr.full_like(count, "", object)
+    for left in range(1, min(FEW_LEFT + 1, members)):
+        words = f"{left} of {members} contacts {'is' if left == 1 else 'are'} closed, too few for a mean"
+        reason = xr.where(count == left, words, reason)
+    return reason
+
+
 def is_open_throughout(dataset: xr.Dataset) -> xr.DataArray:
     """Return True at each point of the sweep at which no contact of any member is closed at any time of the run."""
     dataset = plain(dataset)

@@ -199,12 +199,17 @@ def unresolved_slips(dataset: xr.Dataset) -> list[tuple[str, xr.DataArray]]:
     Each has the points of the sweep that it holds for.
     """
     remarks = []
-    falls = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0))) > 0.0
+    count = ensemble_mean(dataset.get("slow_fall_count", xr.DataArray(0.0)))
+    falls = count > 0.0
     if bool(falls.any()):
+        most = float(count.max())
+        number = "once" if most == 1.0 else f"{most:.3g} times"
+        if float(count.where(falls).min()) < most:
+            number = f"up to {number}"
         text = (
-            "the spring force falls by 0.3 of its largest value so far or more while the "
-            "slider is faster than the stage, but less than ten times: this is no slip event; "
-            "if the fall takes a few clock steps only, reduce clock.step"
+            f"{number} the spring force falls by 0.3 or more of its largest value since the slip event before or the "
+            "last turn of the stage, while the slider is faster than the stage, but less than ten times: this is no "
+            "slip event; if the fall takes a few clock steps only, reduce clock.step"
         )
         remarks.append((text, falls))
     # of a run without slips, or without single ones

@@ -23,7 +23,12 @@ from sim.read.dataset import (
     pieces,
 )
 from sim.read.estimate import Estimate, Estimates, joined
-from sim.read.observables import closed_observables, is_of_contact, restricted
+from sim.read.observables import (
+    closed_observables,
+    is_of_contact,
+    restricted,
+    too_few_closed,
+)
 
 #: Members with which a member may be below 5 % of all.
 FOR_TAILS = 20
@@ -258,6 +263,10 @@ def over_members(
     def of_piece(part: xr.Dataset) -> Estimates:
         values = closed_observables(part, names)
         result, control = summary(values, quantiles), control_variate(part)
+        if (reason := too_few_closed(part)) is not None:
+            for name in filter(is_of_contact, result):
+                why = reason.where(result[name].value.isnull(), "")
+                result[name] = result[name]._replace(reason=why)
         if control is None:
             return result
         return {

@@ -886,6 +886,9 @@ def at_records(dataset: xr.Dataset, names: list[str]) -> Estimates:
             kind: applied.fillna(getattr(load, kind)).assign_attrs(load.value.attrs)
             for kind in ("value", "low", "high")
         }
+        if load.reason is not None:
+            known = fields["value"].notnull()
+            fields["reason"] = load.reason.where(~known, "")
         result["normal_load"] = load._replace(**fields, members=None)
     return result
 

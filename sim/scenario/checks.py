@@ -273,7 +273,6 @@ class Limits(NamedTuple):
 def limits(scene: Scene) -> Limits:
     """Return the numbers that tell if a scene lies within the theory."""
     work, size, solid = scene.adhesion.work, scene.sphere.radius, scene.elastic
-    strength = scene.strengths[1]
     low, high = sorted((0.5 * work, WATER))
     lengths = elastocapillary_length(
         np.array([low, high]), solid.shear_modulus, solid.poisson_ratio
@@ -283,11 +282,20 @@ def limits(scene: Scene) -> Limits:
     return Limits(
         (float(tabor[0]), float(tabor[1])),
         scene.widest / size,
-        float(np.max(strength)) / solid.shear_modulus,
+        _largest_stress(scene) / solid.shear_modulus,
         _of_parabola(scene),
         (low, high),
         (float(lengths[0]), float(lengths[1])),
     )
+
+
+def _largest_stress(scene: Scene) -> float:
+    """Return the largest mean stress in steady sliding, or that of a prescribed force on the contact at rest [Pa]."""
+    largest = float(np.max(scene.strengths[1]))
+    if not scene.drive.forces or not scene.rest_radius > 0.0:
+        return largest
+    force = max(map(abs, scene.drive.forces))
+    return max(largest, force / (math.pi * scene.rest_radius**2))
 
 
 def _of_parabola(scene: Scene) -> float:

@@ -477,14 +477,15 @@ def _remarks(result: Fit) -> Iterator[str]:
             pair = f"{item.free.key} and {other.free.key}"
             yield f"the data hardly separate {pair} (correlation {correlation:.3f})"
     if result.p_value <= POOR:
-        far = f"the best of several searches misses the data by more than their errors (p = {result.p_value:.2g})"
+        far = f"the best of several searches misses the data by more than their errors ({chance(result.p_value)})"
         causes = (
             "the model is incomplete, a fixed key is wrong, or the errors are too small"
         )
         yield f"{far}, so the intervals do not hold: {causes}"
+    yield from _shared(result)
     yield from _loose(result)
     yield from _deciding(result)
-    yield from _heavy(problem, result.best)
+    yield from _heavy(result)
     yield from _unreached(problem, result.best)
     yield from _missed_jumps(problem, result.best)
     yield from _one_sided(problem, result.best)
@@ -505,6 +506,21 @@ def _remarks(result: Fit) -> Iterator[str]:
         )
         if result.no_difference:
             yield "p of no difference follows from an F distribution, because errors are estimated"
+
+
+def _shared(result: Fit) -> Iterator[str]:
+    """Yield the common errors that the fit has found, which its curves contain and its scenario does not."""
+    problem, count = result.problem, len(result.numbers)
+    errors = np.sqrt(np.diag(result.best.covariance)[count:])
+    places = zip(problem.common.items(), result.best.x[count:], errors, strict=True)
+    for (name, size), place, error in places:
+        share = concise(100.0 * size * abs(place), 100.0 * size * error)
+        side = "above" if place > 0.0 else "below"
+        of = "its value in the scenario" if name in problem.names else "its true value"
+        yield (
+            f"{name} is read {share} % {side} {of}, by its common error of {100.0 * size:g} %; the curves of the"
+            " figure contain it, and the scenario does not"
+        )
 
 
 def _loose(result: Fit) -> Iterator[str]:
@@ -539,14 +555,17 @@ def _deciding(result: Fit) -> Iterator[str]:
             yield f"the zero decides: with {zero.key} held at {at}, {'; '.join(moved)}"
 
 
-def _heavy(problem: Problem, best: Minimum) -> Iterator[str]:
+def _heavy(result: Fit) -> Iterator[str]:
     """Yield the points that carry more of the chi^2 than a point of a normal law does.
 
     Each residual is compared with the size of the others by Student's law, with Bonferroni's factor for their number.
+    A table whose curve is within its errors has no such point.
     """
-    squares = problem.residuals(best.x)[: len(problem.values)] ** 2
+    problem = result.problem
+    squares = problem.residuals(result.best.x)[: len(problem.values)] ** 2
     total, freedom = float(squares.sum()), problem.freedom - 1
-    if freedom < 2 or not any(table.has_history for table in problem.tables):
+    is_loop = any(table.has_history for table in problem.tables)
+    if freedom < 2 or (result.p_value > POOR and not is_loop):
         return
     others = np.maximum(total - squares, 1e-300) / freedom
     p_values = 2.0 * stats.t.sf(np.sqrt(squares / others), freedom) * len(squares)
@@ -599,7 +618,7 @@ def _one_sided(problem: Problem, best: Minimum) -> Iterator[str]:
     p_value = stats.binom.cdf(sum(changes), len(changes), 0.5)
     if p_value <= POOR:
         kept = f"{len(changes) - sum(changes)} of {len(changes)}"
-        words = f"residuals keep their sign from point to point {kept} times (p = {p_value:.2g})"
+        words = f"residuals keep their sign from point to point {kept} times ({chance(p_value)})"
         cause = "errors of neighbouring points are correlated, or the curves have another form"
         yield f"{words}: {cause}, so the intervals are too narrow"
 
@@ -1026,7 +1045,8 @@ def _quality(fit: Fit) -> str:
     ending = (
         "\nthe fit has not converged: start nearer, give bounds, or free fewer keys"
     )
-    return f"{chi_square}, AICc {fit.aicc:.4g}" + ending * (not fit.converged)
+    aicc = f"AICc {fit.aicc:.4g}" if math.isfinite(fit.aicc) else "too few for AICc"
+    return f"{chi_square}, {aicc}" + ending * (not fit.converged)
 
 
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:
@@ -1141,8 +1161,14 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path, table: int = 0) ->
     )
     question = [line for line in comment if not line.startswith(_MADE)]
     keys = dict.fromkeys(item.free.name for item in fit.numbers)
-    of = f" of {fit.problem.tables[table].path.name}" if fit.differences else ""
-    result = [f": {', '.join(keys)} are calibrated to measured curves{of}."]
+    measured = fit.problem.tables
+    result = [f": {', '.join(keys)} are calibrated to measured curves."]
+    if fit.differences:
+        names = ", ".join(each.path.name for each in measured)
+        here = measured[table].path.name
+        result = [
+            f": {', '.join(keys)} are calibrated to {names} together; these are the values of {here}."
+        ]
     for item in fit.numbers:
         if item.free.table in (-1, table):
             value, interval, unit = item.texts

@@ -185,12 +185,18 @@ def bounded(
     return f"{text} ± {bound:.{places}f} ({source})"
 
 
-def chance(p_value: float) -> str:
-    """Return a p value in words; one that would be rounded to 1 is above 0.99.
+#: Probability below which only this bound is known, because smaller numbers lose their digits.
+_LEAST_CHANCE = 1e-300
 
-    >>> print(chance(0.0312), chance(0.998), sep="; ")
-    p = 0.031; p > 0.99
+
+def chance(p_value: float) -> str:
+    """Return a p value in words; one that would be rounded to 1 is above 0.99, and none is 0.
+
+    >>> print(chance(0.0312), chance(0.998), chance(0.0), sep="; ")
+    p = 0.031; p > 0.99; p < 1e-300
     """
+    if p_value < _LEAST_CHANCE:
+        return f"p < {_LEAST_CHANCE:g}"
     return f"p = {p_value:.2g}" if p_value < 0.995 else "p > 0.99"
 
 

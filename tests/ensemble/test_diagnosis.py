@@ -731,7 +731,7 @@ def test_the_largest_loss_answers_why_no_mechanism_takes_a_tenth_of_the_area():
         radii = jkr.radius_at_load(load, np.array([left, 42e-3]), 2e-3, 6.4e6)
         return f"{100.0 * (1.0 - (radii[0] / radii[1]) ** 2):.3g}"
 
-    stress = "the mean stress if contact.reversible = 1"
+    stress = "the mean stress of steady sliding if contact.reversible = 1"
     firm = losses(0.05, 1.0, bonds=Unbroken(stress=1e6))
     assert firm == (
         f"largest loss of area at this load (most at contact.load = 50 mN): {lost(1.0)} to {lost(0.05)} % by"
@@ -746,6 +746,46 @@ def test_the_largest_loss_answers_why_no_mechanism_takes_a_tenth_of_the_area():
     assert "fluctuations if shear.paid_by_adhesion = 1" in strict
     assert "100 % (a pull-off) by broken bonds" in losses(-1e-4)
     assert "pull-off" not in firm + half + strict
+
+
+STRETCHED = {
+    "model": "rate",
+    "rupture": {"model": "bell", "zero_force_rate": "25 1/s", "bell_force": "4 pN"},
+    "bond_stiffness": "0.8 uN/m",
+    "rebinding_rate": "250 1/s",
+    "site_density": "6.5e16 1/m^2",
+}
+
+
+def test_a_prescribed_force_has_a_mean_stress_although_its_speed_is_not_known(scene):
+    def pulled(force, **changes):
+        drive = {"model": "force", "force": force}
+        return scene(drive=drive, bonds=STRETCHED, **changes)
+
+    lens = pulled("10 mN")
+    (text,) = said(diagnosis(Plan.of(lens)), "largest loss")
+    assert "by broken bonds" in text and "mean stress" not in text
+    (prescribed,) = said(diagnosis(Plan.of(scene(bonds=STRETCHED))), "largest loss")
+    assert "the mean stress of steady sliding" in prescribed
+    # the interface bears the force on the area at rest
+    area = math.pi * jkr.radius_at_load(LOAD, W, R, 4.0 * G) ** 2
+    assert limits(lens)["tau0/G"][0] == f"{10e-3 / area / G:.3g}"
+    ramp = pulled({"from": "0 N", "to": "-20 mN"})
+    assert limits(ramp)["tau0/G"][0] == f"{20e-3 / area / G:.3g}"
+    (text,) = said(remarks(Plan.of(ramp)), "the mean stress is")
+    assert f"is {20e-3 / area / G:.2g} times" in text
+    assert not said(remarks(Plan.of(pulled("1 mN"))), "the mean stress is")
+
+
+def test_a_loss_of_rounding_is_printed_as_zero(scene):
+    lens = {"solid.shear_modulus": 1.6e6, "sphere.radius": 2e-3, "adhesion.work": 42e-3}
+    course = {"from": "2 um", "to": "-25 um"}
+    mount = {"stiffness": "1 MN/m", "displacement": course}
+    pulled = scene(
+        **lens, contact=mount, **{"clock.record": "1 ms", "clock.duration": "2 s"}
+    )
+    (text,) = said(diagnosis(Plan.of(pulled)), "largest loss")
+    assert "e-" not in text and "; 0 % by the mean stress" in text
 
 
 TIP = {

@@ -164,11 +164,11 @@ def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_l
         rtol=1e-12,
     )
     assert slow[0][0] > 0.0 and position.get_yscale() == position.get_xscale() == "log"
+    # a runaway is marked at its own time, between two records
     last = int(np.isfinite(fast[1]).sum()) - 1
-    crosses = [line for line in speed.lines if line.get_marker() == "x"]
-    assert len(crosses) == 1 and crosses[0].get_xydata().tolist() == [
-        [fast[0][last], fast[1][last]]
-    ]
+    time = 1e3 * float(dataset["runaway_time"].isel(drive_force=1, t=-1))
+    assert np.isfinite(dataset["t"][last + 1]) and fast[0][last] <= time
+    assert runaways(speed) == runaways(position) == [time]
     assert "runaway" in legend_of(position)[0]
     dataset = driven("pull")
     figure = rendered(draw(dataset, "incipient"))
@@ -177,6 +177,27 @@ def test_creep_and_the_way_to_sliding_are_drawn_from_the_first_step_beside_the_l
     own = lines_of(figure.axes[0])[-1]
     assert_allclose(own[0], 1e3 * force[:top], rtol=1e-12)
     assert_allclose(own[1], area[:top] / area[0], rtol=1e-12)
+
+
+def runaways(panel):
+    """The times of the vertical lines of a panel."""
+    return [
+        line.get_xdata()[0] for line in panel.lines if len({*line.get_xdata()}) == 1
+    ]
+
+
+def test_fewer_records_leave_each_runaway_of_a_creep_where_it_is():
+    dataset = driven("creep")
+    (time,) = runaways(rendered(draw(dataset)).axes[0])
+    # all records but the first come after it
+    late = 1e-3 * time < dataset["t"].to_numpy()
+    late[0] = True
+    figure = rendered(draw(dataset.isel(t=late), "creep"))
+    for panel in figure.axes:
+        assert_allclose(panel_time := runaways(panel), [time], rtol=1e-12)
+        assert panel.get_xlim()[0] < panel_time[0] < panel.get_xlim()[1]
+    # the curve has no point, so that the line has the name of its force
+    assert any(name.endswith("mN: runaway") for name in legend_of(figure.axes[0])[0])
 
 
 def test_creep_in_both_directions_is_drawn_on_linear_axes_which_show_both():

@@ -17,6 +17,9 @@ from scipy.optimize import brentq
 
 import sim
 from sim import read
+from sim.read.statistics import over_members
+from sim.read.tables import at_records
+from sim.reports.methods import errors
 
 WORK, RADIUS, SHEAR_MODULUS = 0.05, 10e-6, 0.75e6
 MODULUS = 4.0 * SHEAR_MODULUS
@@ -491,3 +494,65 @@ def test_a_median_beyond_the_run_is_bounded_by_its_end_and_no_mean_of_the_masked
     rows = read.highlights(read.Run(dataset)).rows
     texts = [text for row in rows for key, text in row.items() if "half" in key]
     assert texts[:2] == ["> 1", "> 1"]
+
+
+def test_a_lowest_load_that_is_the_pull_off_has_its_bound_and_another_one_has_none():
+    def both(contact, **tables):
+        found = statistics(ran(PROBE, contact, **tables))
+        return found["pull_off_load"], found["lowest_load"]
+
+    lagging = {
+        "model": "rate_dependent",
+        "front_speed": "1 um/s",
+        "after_pull_off": "stay_open",
+    }
+    detached, lowest = both(lagging | {"load": {"from": "2 uN", "to": "-20 uN"}})
+    assert_array_equal(lowest.value, detached.value)
+    assert float(detached.bound) > 0.0
+    assert_array_equal(lowest.bound, detached.bound)
+    # behind a stiff spring the equilibrium contact bears less at its pull-off than before
+    still = {"model": "equilibrium", "displacement": {"from": "0.1 um", "to": "-1 um"}}
+    detached, lowest = both(still | {"stiffness": "1 kN/m"})
+    assert float(lowest.value) < float(detached.value)
+    assert lowest.bound is None
+    # a load that stays above the pull-off has a lowest value without an error of the step
+    _, lowest = both(lagging | {"load": {"from": "2 uN", "to": "-1 uN"}})
+    assert lowest.bound is None or not np.isfinite(lowest.bound)
+
+
+@pytest.mark.parametrize("per_member", [True, False])
+def test_a_mean_of_closed_contacts_that_are_too_few_names_their_number(per_member):
+    pulled = {"model": "equilibrium", "load": {"from": "1 mN", "to": "-0.5 mN"}}
+    sliding = FLUCTUATIONS | {"drive": {"model": "steady", "speed": "1 mm/s"}}
+    dataset = ran(LENS, pulled, **sliding, record={"per_member": per_member})
+    each = ran(LENS, pulled, **sliding) if not per_member else dataset
+    closed = each["in_contact"].sum("member").to_numpy()
+    assert {1, 2} & {*closed.tolist()}
+    radius = over_members(dataset, ["contact_radius"])["contact_radius"]
+    assert radius.reason is not None
+    for count, value, reason in zip(closed, radius.value, radius.reason, strict=True):
+        text = str(reason.item())
+        if count > 2:
+            assert np.isfinite(value) and text == ""
+        elif count:
+            assert np.isnan(value) and text.startswith(f"{count:.0f} of 24 contacts ")
+        else:
+            assert np.isnan(value) and "of 24" not in text
+    # the load of an open contact is the applied one, and nothing is missing
+    load = at_records(dataset, ["normal_load"])["normal_load"]
+    assert bool(load.value.notnull().all()) and bool((load.reason == "").all())
+
+
+@pytest.mark.parametrize("per_member", [True, False])
+def test_the_error_of_the_load_at_pull_off_is_named_with_it_and_only_after_one(
+    per_member,
+):
+    def words(lowest):
+        pulled = {"model": "equilibrium", "load": {"from": "1 mN", "to": lowest}}
+        sliding = FLUCTUATIONS | {"drive": {"model": "steady", "speed": "1 mm/s"}}
+        dataset = ran(LENS, pulled, **sliding, record={"per_member": per_member})
+        return [text for text in errors(dataset) if "µN" in text]
+
+    (text,) = words("-0.5 mN")
+    assert "load at pull-off" in text
+    assert words("0.5 mN") == []

@@ -309,12 +309,20 @@ def test_a_force_that_falls_while_the_slider_is_hardly_faster_than_the_stage_is_
     assert any("is no slip event" in line for line in lines) is is_named
 
 
-def test_a_slow_fall_of_the_force_is_named_with_the_point_of_the_sweep_that_has_it():
-    slow = {"drive": PULLED["drive"] | {"stage": "3 mm/s"}}
-    sweep = {"sweep": {"drive.mass": ["50 mg", "5 g"]}}
-    lines = lines_of(run(sim.Scenario(**PULLED | slow | sweep)))
-    named = [line for line in lines if "no slip event;" in line]
-    assert len(named) == 1 and named[0].endswith("(at drive_mass = 0.005 kg)")
+def test_falls_that_are_no_slip_events_are_named_with_their_number_and_their_points():
+    drive = PULLED["drive"] | {"stage": "3 mm/s"}
+    sweep = {"drive.mass": ["5 g", "50 mg"]}
+    dataset = run(sim.Scenario(**PULLED | {"drive": drive, "sweep": sweep}))
+    (line,) = {line for line in lines_of(dataset) if "this is no slip event" in line}
+    number = int(dataset["slow_fall_count"].max())
+    assert int(dataset["slow_fall_count"].min()) == 0
+    assert line.startswith(f"{number} times the spring force")
+    assert line.endswith("(at drive_mass = 0.005 kg)")
+    heavy = dataset.isel(drive_mass=0)
+    (line,) = {line for line in lines_of(heavy) if "this is no slip event" in line}
+    assert (
+        line.startswith(f"{number} times the spring force") and "at drive" not in line
+    )
 
 
 @pytest.mark.parametrize("record", ["3.2 ms", "1.2 s"])

@@ -514,6 +514,40 @@ def test_correlated_errors_are_named_and_independent_ones_are_not():
     assert named[0.9] > 0.5 * count
 
 
+def test_a_single_point_that_misses_the_curve_is_named_and_points_within_their_errors_are_not(
+    tmp_path, truth
+):
+    def remarks(factor, error=0.01):
+        drawn = noisy(truth, 0.01, 4)
+        drawn["contact_area"] = drawn["contact_area"] * np.where(
+            np.arange(len(SPEEDS)) == 3, factor, 1.0
+        )
+        path = table(tmp_path / "rows.csv", {"speed [m/s]": SPEEDS}, drawn, error)
+        keys = ["bonds.critical_speed", "bonds.stress"]
+        found = fit(load(LENS), [path], keys, steady=True)
+        return [text for text in found.remarks if "few points" in text]
+
+    (text,) = remarks(1.2)
+    assert "contact_area: row 4 (" in text and text.count("row") == 1
+    assert remarks(1.0) == []
+    # all points miss a curve of too small errors, and none of them more than the others
+    assert remarks(1.0, 0.002) == []
+
+
+def test_a_fit_of_too_few_numbers_has_no_criterion_and_no_chance_is_zero(tmp_path):
+    def fitted(radii, error):
+        conditions = {"normal_load [N]": np.array([0.0, 1e-3, 2e-3])}
+        curve = {"contact_radius": radii}
+        path = table(tmp_path / "three.csv", conditions, curve, error)
+        keys = ["adhesion.work", "solid.shear_modulus"]
+        return repr(fit(still(), [path], keys, steady=True))
+
+    radii = sim.laws.jkr.radius_at_load(np.array([0.0, 1e-3, 2e-3]), 60e-3, 2e-3, 6.4e6)
+    text = fitted(radii, 0.01)
+    assert "inf" not in text and "too few for AICc" in text
+    assert "p < 1e-300" in fitted(radii * np.array([1.0, 2.0, 1.0]), 1e-4)
+
+
 def test_points_that_the_best_curve_does_not_reach_are_counted_and_named(tmp_path):
     loads = np.array([-3e-4, -2e-4, 0.0, 1e-3, 2e-3])
     radii = sim.laws.jkr.radius_at_load(loads, 60e-3, 2e-3, 6.4e6)
@@ -633,6 +667,11 @@ def test_curves_without_errors_are_weighed_by_scatter_and_errors_of_all_areas_wi
     plain = sim.fit(LENS, path, keys, steady=True)
     shared = fit(load(LENS), [path], keys, {"contact_area": 0.03}, steady=True)
     assert_allclose(0.03 * shared.best.x[3], 0.03, atol=0.03)
+    # the fitted scenario alone misses the readings by the error that they share
+    (text,) = (text for text in shared.remarks if "common error" in text)
+    assert f"contact_area is read {3.0 * shared.best.x[3]:.1f}" in text
+    assert "above its value in the scenario" in text and "common error of 3 %" in text
+    assert not [text for text in plain.remarks if "common error" in text]
     widths = [
         found.numbers[2].interval.high - found.numbers[2].interval.low
         for found in (plain, shared)
@@ -1703,6 +1742,10 @@ def test_the_command_writes_a_scenario_for_each_table_with_its_load_and_draws_a_
         assert_allclose(
             [fitted[key][1] for key in expected], [*expected.values()], rtol=1e-11
         )
+        # the numbers and the chi^2 are of both tables, and the file has the values of one
+        made = (tmp_path / f"lens_fit_{name}.toml").read_text(encoding="utf-8")
+        (line,) = (line for line in made.splitlines() if "Made by sim fit" in line)
+        assert line.count(".csv") == 3 and line.endswith(f"of {name}.csv.")
     assert not (tmp_path / "lens_fit.toml").exists()
     assert command(*words, "--force").exit_code == 0 and "(wet / dry)" in done.output
     result = sim.fit(LENS, paths, ["bonds.stress"], steady=True, per_table=[SPEED])
