@@ -377,7 +377,7 @@ def test_the_friction_maximum_and_the_static_peak_are_those_of_the_clock_steps_w
 
 @pytest.mark.parametrize(
     "rupture",
-    [None, {"model": "cut_off", "rate": "1 1/s", "stretch": "5 nm"}],
+    [None, {"model": "cut_off", "rate": "1 1/s", "stretch": "50 nm"}],
     ids=["bell", "cut_off"],
 )
 def test_the_time_of_a_peak_after_a_start_is_within_its_bound_of_that_at_fine_steps(
