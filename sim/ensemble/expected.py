@@ -215,6 +215,8 @@ def largest_losses(point: Scenario) -> LargestLosses:
         changes = {"contact.reversible": 1.0, "adhesion.bond_share": 0.0}
         reversible = changed(point, changes)
         left.append(steady_course(reversible, times, speeds, np.zeros(1)).radius)
+    # a cohesive sphere that is held within reach of the attraction may have no contact to lose
+    full = np.where(full > 0.0, full, np.nan)
     losses = [1.0 - (np.nan_to_num(radius) / full)[:, 0] ** 2 for radius in left]
     if not point.contact.takes_mean_stress:
         losses.append(np.full(losses[0].shape, np.nan))

@@ -18,13 +18,14 @@ from sim.ensemble.diagnosis import (
     Worst,
     diagnosis,
     distinct_speeds,
+    error_in_words,
     remarks,
     stability,
     worst_of_sweep,
 )
 from sim.ensemble.pace import counted, pace as pace_of
 from sim.ensemble.plan import IN_MEMORY, Plan, map_bytes, state_numbers, work
-from sim.ensemble.swept import grouped, in_words, places, spread
+from sim.ensemble.swept import grouped, places, spread
 from sim.laws.limits import JKR_FROM
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
@@ -542,7 +543,7 @@ def _errors(plan: Plan, most: Worst | None) -> Rows:
             f"{noise:.2g} points of A/A_JKR, of {members} members at one time",
         )
     )
-    return [*rows, ("largest at", in_words(plan, point, errors["error_speed"]))]
+    return [*rows, ("largest at", error_in_words(plan, point, errors))]
 
 
 def _slider(plan: Plan) -> Rows:
