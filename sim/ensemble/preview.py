@@ -440,12 +440,18 @@ def _limits(points: Sequence[Scenario]) -> Rows:
         meaning = f"for z0 = {of_range} nm; JKR's theory holds above about {JKR_FROM:g}"
         rows.append(("Tabor number", _span(tabor, digits=".3g"), meaning))
     if slopes := [row.slope for row in known if row.slope > 0.0]:
-        meaning = "strain of the solid"
+        squeezed = [row.squeeze for row in known if row.squeeze > 0.0]
+        meaning = (
+            "strain of the solid" if not squeezed else "slope of the sphere at the edge"
+        )
         off = [row.parabola for row in known if math.isfinite(row.parabola)]
         if off:
             share = f"{100.0 * max(off):.2g} %"
             meaning += f"; the area of a parabola is up to {share} larger than that of a sphere"
         rows.append(("a/R", _span(slopes, digits=".3g"), meaning))
+        if squeezed:
+            meaning = "about the shear strain at the base of a layer that is thinner than the contact"
+            rows.append(("a³/(√6 R h²)", _span(squeezed, digits=".3g"), meaning))
     if strains := [row.strain for row in known if row.strain > 0.0]:
         meaning = "shear strain of the surface; finite strains reduce the area from about 0.1 on"
         rows.append(("tau0/G", _span(strains, digits=".3g"), meaning))

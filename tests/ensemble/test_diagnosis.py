@@ -953,3 +953,27 @@ def test_a_disc_is_proposed_to_a_contact_that_can_have_one_alone():
         texts = remarks(Plan.of(sim.Scenario(**parts | {"contact": contact})))
         (text,) = (each for each in texts if "of the plane per new area" in each)
         assert ("disc" in text) is is_known
+
+
+def test_the_shear_of_a_layer_that_a_sphere_squeezes_is_that_of_its_flow_outwards(
+    scene,
+):
+    thickness = 10e-6
+    thin = scene(**{"solid.thickness": thickness})
+    a = thin.widest
+    r = np.linspace(0.0, a, 4001)
+    sunk = a**2 / (2.0 * R) * (1.0 - (r / a) ** 2)
+    # the volume that is pressed out inside of r leaves through 2 pi r h, with no slip at the base alone
+    outwards = scipy.integrate.cumulative_simpson(sunk * r, x=r, initial=0.0)[1:]
+    strain = 3.0 * outwards / (r[1:] * thickness) / thickness
+    rows = limits(thin)
+    (name,) = (name for name in rows if "h²" in name)
+    assert_allclose(float(rows[name][0]), strain.max(), rtol=5e-3)
+    assert "strain of the solid" not in rows["a/R"][1]
+    (text,) = said(remarks(Plan.of(thin)), "the sphere shears the base")
+    assert f"about {strain.max():.2g}:" in text
+    for others in ({}, {"solid.thickness": 10.0 * a}):
+        wide = scene(**others)
+        assert not any("h²" in name for name in limits(wide))
+        assert "strain of the solid" in limits(wide)["a/R"][1]
+        assert not said(remarks(Plan.of(wide)), "the sphere shears")
