@@ -177,6 +177,12 @@ def cure(point: Scenario, errors: dict[str, float]) -> str:
     return keys + _LESS_SPREAD * (bool(many) or wide > side)
 
 
+def error_in_words(plan: Plan, point: Scenario, errors: dict[str, float]) -> str:
+    """Return where the systematic errors of a point are largest, with the amplitude if that depends on the motion."""
+    at = in_words(plan, point, errors["error_speed"])
+    return f"{at}, at amplitude 1" if point.shear.law.remembers else at
+
+
 def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
     """Return the remarks on a run, one sentence each; ``most`` are its ``worst`` errors if they are known."""
     # modes are slow to make, and the remarks on a clock step need them
@@ -184,14 +190,10 @@ def remarks(plan: Plan, most: Worst | None = None) -> list[str]:
     texts = grouped(plan, places(len(plan.points), many), Scenario.remarks)
     texts += grouped(plan, places(len(plan.points), COMPUTED), _outside)
     if (most := most or worst_of_sweep(plan.points)) and (keys := cure(*most)):
-        point, area, friction = (
-            most[0],
-            *(100.0 * most[1][f"cell_error_{of}"] for of in ("area", "friction")),
+        area, friction = (
+            100.0 * most[1][f"cell_error_{of}"] for of in ("area", "friction")
         )
-        too, at = (
-            "large" if area > 0.0 else "small",
-            in_words(plan, point, most[1]["error_speed"]),
-        )
+        too, at = "large" if area > 0.0 else "small", error_in_words(plan, *most)
         size = (
             f"{abs(area):.2g} points and the friction {abs(friction):.2g} % too {too}"
         )
@@ -237,7 +239,7 @@ def diagnosis(plan: Plan) -> list[str]:
         *_largest_losses(plan, list(closed)),
         *grouped(plan, list(closed), _waves),
         *_sensitive(plan, middle),
-        *_lagging(plan, middle),
+        *_most_lagging(plan, list(closed)),
     ]
 
 
@@ -258,8 +260,10 @@ def _percents(shares: Iterable[float]) -> str:
 def _stays_open(plan: Plan, point: Scenario) -> bool:
     """Return True if the first members of a run start with an open contact, and no mount closes it later."""
     contact = point.contact
-    reach = contact.jump_in_distance(point.adhesion.work)
-    if reach > 0.0 or max(contact.course.extremes) >= 0.0:
+    # a dead load comes back at a load of zero, whatever the range of adhesion
+    is_held = contact.kind != "load"
+    reach = contact.jump_in_distance(point.adhesion.work) if is_held else 0.0
+    if max(contact.course.extremes) >= -reach:
         return False
     members = np.arange(min(plan.members, _STARTED))
     state = point.stepper.start(MemberNoise.of(point.seed, members))
@@ -283,8 +287,9 @@ def _stored(plan: Plan, courses: Courses) -> Iterator[str]:
         return
     ends = (engineering(end(most.values()), "J/m^2") for end in (min, max))
     shares = (most[place] / plan.points[place].adhesion.work for place in most)
+    changes = any(np.ptp(course.energy) > 0.0 for course in courses.values())
     yield (
-        f"stored energy in steady sliding {' to '.join(dict.fromkeys(ends))},"
+        f"stored energy in steady sliding {'up to ' * changes}{' to '.join(dict.fromkeys(ends))},"
         f" {_percents(shares)} of the work of adhesion"
     )
 
@@ -350,7 +355,13 @@ def _smallest_area(plan: Plan, courses: Courses) -> Iterator[str]:
     every = np.concatenate([course.area for course in courses.values()])
     varies = np.nanmax(every) > np.nanmin(every)
     smallest = ", smallest" if varies else ""
-    at = in_words(plan, plan.points[place], float(course.speed[row]))
+    point = plan.points[place]
+    at = in_words(plan, point, float(course.speed[row]))
+    if varies and point.contact.changes:
+        contact, time = point.contact, along(point)[0][row]
+        size = float(contact.course.at(time, point.times.duration)[0])
+        unit = "N" if contact.kind == "load" else "m"
+        at += f", contact.{contact.kind} = {engineering(size, unit)}"
     text = f"in steady sliding mean A/A_JKR {_percents(every)}{smallest} at {at}: points taken by"
     text += ",".join(f" {name} {points:.2g}" for name, (points, _) in taken.items())
     if taken.keys() >= {"bonds", "fluctuations"}:
@@ -490,9 +501,21 @@ def _behind(course: Array, steady: Array) -> tuple[float, float, float]:
     )
 
 
-def _lagging(plan: Plan, point: Scenario) -> Iterator[str]:
+def _most_lagging(plan: Plan, closed: Sequence[int]) -> Iterator[str]:
+    """Yield the sentence of ``_lagging`` on that of the first, middle and last points of a sweep that lags most."""
+    lags = {
+        sentence: size
+        for place in {closed[0], closed[len(closed) // 2], closed[-1]}
+        for size, sentence in _lagging(plan, plan.points[place])
+    }
+    if lags:
+        yield max(lags, key=lambda sentence: lags[sentence])
+
+
+def _lagging(plan: Plan, point: Scenario) -> Iterator[tuple[float, str]]:
     """Yield how far values along a ramp or table are from steady ones, and how far they would be along a slower one.
 
+    The sentence stands behind the sum of the lags of area and friction [1].
     There is no statement for few bonds and for a relaxing amplitude, which the course leaves out, nor for a part
     with feedback, which is slow. Nothing is said of a table with a jump or beside a changing load.
     """
@@ -518,9 +541,13 @@ def _lagging(plan: Plan, point: Scenario) -> Iterator[str]:
         times = "10 times drive.time and " if rows else ""
         at = f" at {in_words(plan, point)}" if len(plan.points) > 1 else ""
         yield (
-            f"along the {point.drive.model}{at} A/A_JKR is up to {values[0]:.2g} points off its steady value, the"
-            f" friction {values[1]:.2g} % of its largest (near {engineering(behind[2], 'm/s')});"
-            f' {times}clock.duration = "{engineering(longer, "s")}" leaves {values[2]:.2g} points and {values[3]:.2g} %'
+            behind[0] + behind[1],
+            (
+                f"along the {point.drive.model}{at} A/A_JKR is up to {values[0]:.2g} points off its steady value, the"
+                f" friction {values[1]:.2g} % of its largest (near {engineering(behind[2], 'm/s')});"
+                f' {times}clock.duration = "{engineering(longer, "s")}" leaves {values[2]:.2g} points and'
+                f" {values[3]:.2g} %"
+            ),
         )
 
 

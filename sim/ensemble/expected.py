@@ -217,6 +217,8 @@ def largest_losses(point: Scenario) -> LargestLosses:
         changes = {"contact.reversible": 1.0, "adhesion.bond_share": 0.0}
         reversible = changed(point, changes)
         left.append(steady_course(reversible, times, speeds, np.zeros(1)).radius)
+    # a cohesive sphere that is held within reach of the attraction may have no contact to lose
+    full = np.where(full > 0.0, full, np.nan)
     losses = [1.0 - (np.nan_to_num(radius) / full)[:, 0] ** 2 for radius in left]
     losses = [np.where(np.abs(loss) < _ROUNDING, 0.0, loss) for loss in losses]
     if not point.contact.takes_mean_stress:

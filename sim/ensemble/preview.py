@@ -18,13 +18,14 @@ from sim.ensemble.diagnosis import (
     Worst,
     diagnosis,
     distinct_speeds,
+    error_in_words,
     remarks,
     stability,
     worst_of_sweep,
 )
 from sim.ensemble.pace import counted, pace as pace_of
 from sim.ensemble.plan import IN_MEMORY, Plan, map_bytes, state_numbers, work
-from sim.ensemble.swept import grouped, in_words, places, spread
+from sim.ensemble.swept import grouped, places, spread
 from sim.laws.limits import JKR_FROM
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
@@ -439,12 +440,18 @@ def _limits(points: Sequence[Scenario]) -> Rows:
         meaning = f"for z0 = {of_range} nm; JKR's theory holds above about {JKR_FROM:g}"
         rows.append(("Tabor number", _span(tabor, digits=".3g"), meaning))
     if slopes := [row.slope for row in known if row.slope > 0.0]:
-        meaning = "strain of the solid"
+        squeezed = [row.squeeze for row in known if row.squeeze > 0.0]
+        meaning = (
+            "strain of the solid" if not squeezed else "slope of the sphere at the edge"
+        )
         off = [row.parabola for row in known if math.isfinite(row.parabola)]
         if off:
             share = f"{100.0 * max(off):.2g} %"
             meaning += f"; the area of a parabola is up to {share} larger than that of a sphere"
         rows.append(("a/R", _span(slopes, digits=".3g"), meaning))
+        if squeezed:
+            meaning = "about the shear strain at the base of a layer that is thinner than the contact"
+            rows.append(("a³/(4√3 R h²)", _span(squeezed, digits=".3g"), meaning))
     if strains := [row.strain for row in known if row.strain > 0.0]:
         meaning = "shear strain of the surface; finite strains reduce the area from about 0.1 on"
         rows.append(("tau0/G", _span(strains, digits=".3g"), meaning))
@@ -542,7 +549,7 @@ def _errors(plan: Plan, most: Worst | None) -> Rows:
             f"{noise:.2g} points of A/A_JKR, of {members} members at one time",
         )
     )
-    return [*rows, ("largest at", in_words(plan, point, errors["error_speed"]))]
+    return [*rows, ("largest at", error_in_words(plan, point, errors))]
 
 
 def _slider(plan: Plan) -> Rows:

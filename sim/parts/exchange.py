@@ -57,6 +57,10 @@ class Setting(NamedTuple):
         Clock of the run.
     by_maximum : bool
         True if the numbers of the bonds follow from a friction maximum that was given.
+    reach : float
+        Distance at which an approaching sphere jumps into contact with all the bonds of rest [m].
+    takes_disc : bool
+        True if the contact can have the energy of a disc.
     """
 
     solid: ElasticSolid
@@ -65,6 +69,8 @@ class Setting(NamedTuple):
     cell: float
     times: Times
     by_maximum: bool
+    reach: float
+    takes_disc: bool
 
 
 def _constant(value: float) -> Array:

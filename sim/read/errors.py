@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.read.dataset import ensemble_mean, sweep_dims
+from sim.read.dataset import ensemble_mean, sweep_dims, word
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 
@@ -14,6 +14,8 @@ _UNITS = {
     "area": ("points of A/A_JKR", 100.0),
     "friction": ("% of the friction", 100.0),
 }
+#: Amplitude that depends on the motion: its errors are those of an amplitude of 1.
+_OF_MOTION = "slip_rate"
 #: Sources of an error by the first word of its name.
 _SOURCES = {
     "cell": "the mean ΔΓ of the cell",
@@ -105,6 +107,11 @@ def _largest(dataset: xr.Dataset, name: str) -> SystematicError:
         and factor > 1.0
     ):
         words.append(engineering(float(point["error_speed"]), "m/s"))
+    amplitude = word(dataset, "shear.amplitude.model", "").isel(
+        place, missing_dims="ignore"
+    )
+    if factor > 1.0 and str(amplitude.item()) == _OF_MOTION:
+        words.append("at amplitude 1")
     return SystematicError(
         name, factor * values, unit, ", ".join(words), variable.attrs.get("cure", "")
     )

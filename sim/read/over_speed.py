@@ -638,12 +638,14 @@ def _lag(
     """Return the speed in steady sliding where that of a course differs from it, and True where it is stable.
 
     ``ends`` are the speed of the course and its interval. The speed of a course that does
-    not reach the loss differs if its own speeds hold the one in steady sliding.
+    not reach the loss differs if its own speeds hold the one in steady sliding. That of a
+    course whose noise leaves the interval alone differs if this does not hold it.
     """
     off = abs(np.log(ends[0] / steady))
     differs = off > np.fmax(0.5 * np.log(ends[2] / ends[1]), _UNSEEN)
     moving = speed.where(speed > 0.0)
     within = (steady > moving.min("t")) & (steady < moving.max("t"))
+    within = within & ~((steady >= ends[1]) & (steady <= ends[2]))
     return [steady.where(differs | (ends[0].isnull() & within)), stable]
 
 

@@ -255,6 +255,8 @@ class Limits(NamedTuple):
         Tabor number at each of the likely distances of the attraction [1].
     slope, strain : float
         Largest contact radius over that of the sphere, and largest mean stress over the shear modulus [1].
+    squeeze : float
+        About the largest shear strain at the base of a layer that is thinner than the contact [1]; 0 of others.
     parabola : float
         Largest area of a parabola over that of a circle, less 1 [1]; nan if that of a circle is not known.
     tensions, capillary : tuple of float
@@ -265,6 +267,7 @@ class Limits(NamedTuple):
     tabor: tuple[float, float]
     slope: float
     strain: float
+    squeeze: float
     parabola: float
     tensions: tuple[float, float]
     capillary: tuple[float, float]
@@ -283,6 +286,7 @@ def limits(scene: Scene) -> Limits:
         (float(tabor[0]), float(tabor[1])),
         scene.widest / size,
         _largest_stress(scene) / solid.shear_modulus,
+        _of_squeeze(scene),
         _of_parabola(scene),
         (low, high),
         (float(lengths[0]), float(lengths[1])),
@@ -296,6 +300,21 @@ def _largest_stress(scene: Scene) -> float:
         return largest
     force = max(map(abs, scene.drive.forces))
     return max(largest, force / (math.pi * scene.rest_radius**2))
+
+
+def _of_squeeze(scene: Scene) -> float:
+    """Return about the largest shear strain at the base of a layer that is thinner than the contact, 0 of others.
+
+    As long as hardly any volume leaves a thin incompressible layer under the contact, the parabola sinks in by a²/4R
+    − r²/2R, and the layer flows outwards by (a² − r²) r/8Rh in the mean over its thickness. The base is sheared by
+    three times this over the thickness, which is largest at r = a/√3.
+    """
+    thickness = scene.solid.thickness
+    if thickness is None or not scene.widest > thickness:
+        return 0.0
+    return float(
+        scene.widest**3 / (4.0 * math.sqrt(3.0) * scene.sphere.radius * thickness**2)
+    )
 
 
 def _of_parabola(scene: Scene) -> float:
@@ -333,6 +352,11 @@ def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
         yield (
             f"the mean stress is {known.strain:.2g} times the shear modulus: finite strains, which are left out, reduce"
             f" the area from about {LARGEST_STRAIN} on"
+        )
+    if known.squeeze > LARGEST_STRAIN:
+        yield (
+            f"the sphere shears the base of the thin layer by about {known.squeeze:.2g}: the theory is valid for small"
+            f" strains, up to about {LARGEST_STRAIN}"
         )
     thickness = scene.solid.thickness
     if thickness is not None and scene.widest > _COMPRESSED * thickness:

@@ -507,6 +507,10 @@ class Scenario:
             self._square,
             self.times,
             "rebinding_ratio" in quantities(self.bonds),
+            self.contact.jump_in_distance(self.adhesion.work),
+            not self.contact.faults(
+                is_driven=False, is_on_disc=True, is_on_layer=False
+            ),
         )
 
     @cached_property

@@ -908,3 +908,113 @@ def test_a_run_has_as_many_speeds_as_asked_for_and_each_contact_has_a_diagnosis(
         assert not any(
             re.search("nan|inf ", text) for text in [*diagnosis(plan), *remarks(plan)]
         )
+
+
+#: Bonds that lag behind a ramp through their critical speed.
+SLOW = {
+    "model": "rate",
+    "critical_speed": "1 mm/s",
+    "rebinding_rate": "5 1/s",
+    "stress": "0.2 MPa",
+}
+QUICK = {"model": "ramp", "from": "0.1 mm/s", "to": "5 mm/s"}
+
+
+def test_the_lag_along_a_ramp_is_that_of_the_point_of_a_sweep_that_lags_most(scene):
+    rates = ["5 1/s", "5000 1/s", "6000 1/s"]
+    lens = scene(drive=QUICK, bonds=SLOW, sweep={"bonds.rebinding_rate": rates})
+    (line,) = said(diagnosis(Plan.of(lens)), "along the ramp")
+    assert "at bonds.rebinding_rate = 5 1/s" in line
+
+
+def test_the_smallest_area_is_told_with_the_mount_that_makes_it_and_a_largest_energy_as_one(
+    scene,
+):
+    falling = scene(bonds=BROKEN, contact={"load": {"from": "4 mN", "to": "1 mN"}})
+    (mean,) = said(diagnosis(Plan.of(falling)), "in steady sliding mean A/A_JKR")
+    assert "smallest at 1 µm/s, contact.load = 1 mN:" in mean
+    grows = {"model": "onset", "speed": "1 mm/s", "width": 0.2}
+    for amplitude, changes in ((grows, True), ({"model": "constant"}, False)):
+        lens = scene(drive=QUICK, bonds=BROKEN, shear=CALM | {"amplitude": amplitude})
+        (stored,) = said(diagnosis(Plan.of(lens)), "stored energy")
+        assert ("up to" in stored) is changes
+
+
+def test_errors_of_an_amplitude_that_depends_on_the_motion_are_told_as_those_of_amplitude_1(
+    scene,
+):
+    """In steady sliding the field has no amplitude, so that the cell has no error there."""
+    spring = {"model": "spring", "stage": "1 mm/s", "stiffness": "500 N/m"}
+    spring |= {"damping": "0.1 N s/m", "contact_stiffness": "rigid"}
+    clock = {"duration": "10 ms", "step": "1 ms"}
+    moved = {"model": "slip_rate", "memory_length": "20 um"}
+    for amplitude, is_told in ((moved, True), ({"model": "constant"}, False)):
+        parts = {"bonds": BROKEN | {"critical_speed": "9 mm/s"}, "clock": clock}
+        lens = scene(drive=spring, shear=LENS | {"amplitude": amplitude}, **parts)
+        text = str(preview(lens))
+        assert ("1 mm/s, at amplitude 1" in text) is is_told
+        errors = read.systematic_errors(run(lens))
+        assert all(each.where.endswith("at amplitude 1") is is_told for each in errors)
+        assert errors
+
+
+PROBE = {
+    "clock": {"duration": "1 ms", "step": "0.1 ms"},
+    "solid": {"youngs_modulus": "60 GPa"},
+    "sphere": {"radius": "100 nm"},
+    "adhesion": {"work": "0.4 J/m^2"},
+    "drive": {"speed": "1 um/s"},
+}
+
+
+def test_a_tip_that_never_comes_within_reach_or_hangs_too_heavy_is_open_for_the_whole_run():
+    def told(**contact):
+        contact |= {"model": "cohesive", "range": "0.3 nm"}
+        plan = Plan.of(sim.Scenario(**PROBE | {"contact": contact}))
+        return diagnosis(plan), remarks(plan)
+
+    for contact, is_open in (
+        ({"load": "-0.3 uN"}, True),
+        ({"load": {"from": "-0.3 uN", "to": "0 N"}}, False),
+        ({"indentation": {"from": "-5 nm", "to": "-1 nm"}}, True),
+        ({"indentation": {"from": "-5 nm", "to": "-0.29 nm"}}, False),
+    ):
+        texts, notes = told(**contact)
+        assert bool(said(texts, "open for the whole run")) is is_open, contact
+        assert bool(said(notes, "the contact is open even")) is is_open, contact
+
+
+def test_a_disc_is_proposed_to_a_contact_that_can_have_one_alone():
+    field = {"model": "gaussian", "rms": "1 GPa", "length": "2 nm"}
+    parts = PROBE | {"shear": {"model": "mean", "spectrum": field}}
+    for model, is_known in (("cohesive", False), ("equilibrium", True)):
+        contact = {"model": model, "load": "50 nN"}
+        contact |= {"range": "0.3 nm"} if model == "cohesive" else {}
+        texts = remarks(Plan.of(sim.Scenario(**parts | {"contact": contact})))
+        (text,) = (each for each in texts if "of the plane per new area" in each)
+        assert ("disc" in text) is is_known
+
+
+def test_the_shear_of_a_layer_that_a_sphere_squeezes_is_that_of_its_flow_outwards(
+    scene,
+):
+    thickness = 10e-6
+    thin = scene(**{"solid.thickness": thickness})
+    a = thin.widest
+    r = np.linspace(0.0, a, 4001)
+    # no volume leaves the layer under the contact
+    sunk = a**2 / (4.0 * R) - r**2 / (2.0 * R)
+    # the volume that is pressed out inside of r leaves through 2 pi r h, with no slip at the base alone
+    outwards = scipy.integrate.cumulative_simpson(sunk * r, x=r, initial=0.0)[1:]
+    strain = 3.0 * outwards / (r[1:] * thickness) / thickness
+    rows = limits(thin)
+    (name,) = (name for name in rows if "h²" in name)
+    assert_allclose(float(rows[name][0]), strain.max(), rtol=5e-3)
+    assert "strain of the solid" not in rows["a/R"][1]
+    (text,) = said(remarks(Plan.of(thin)), "the sphere shears the base")
+    assert f"about {strain.max():.2g}:" in text
+    for others in ({}, {"solid.thickness": 10.0 * a}):
+        wide = scene(**others)
+        assert not any("h²" in name for name in limits(wide))
+        assert "strain of the solid" in limits(wide)["a/R"][1]
+        assert not said(remarks(Plan.of(wide)), "the sphere shears")

@@ -866,3 +866,17 @@ def test_below_the_maximum_of_friction_any_spring_slides_steadily():
     assert_allclose(speeds, [1e-3, 4e-3], rtol=1e-6)
     # behind 25 N/m, where 1128 N/m are needed
     assert stable.tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "lags"),
+    [(math.nan, math.nan, True), (1e-6, 1e-4, False), (2e-5, 1e-4, True)],
+)
+def test_a_course_whose_noise_leaves_an_interval_lags_if_this_does_not_hold_the_steady_speed(
+    low, high, lags
+):
+    steady, ends = 1e-5, (math.nan, low, high)
+    speed = xr.DataArray(np.geomspace(1e-8, 1e-3, 20), dims="t")
+    ends = [xr.DataArray(end) for end in ends]
+    stated, _ = over_speed._lag(ends, xr.DataArray(steady), xr.DataArray(True), speed)
+    assert bool(stated.notnull()) is lags

@@ -223,8 +223,13 @@ class Cohesive(Equilibrium):
             "A_JKR and jkr_radius are those of the cohesive contact with the full work of adhesion"
         ]
         if math.isnan(setting.rest_radius) and self.load is None:
+            comes = "the contact begins open and jumps in where the sphere comes"
+            never = (
+                "the contact is open even with all its adhesion: the sphere never comes"
+            )
+            closes = max(self.course.extremes) >= -setting.reach
             remarks.append(
-                "the contact begins open and jumps in where the sphere comes within reach of the attraction"
+                f"{comes if closes else never} within reach of the attraction"
             )
         elif math.isnan(setting.rest_radius):
             remarks += super().remarks(setting)

@@ -217,7 +217,9 @@ class ShearModel:
             )
             off = f"{what} stores {share:.1%} of the fluctuation energy of the plane per new area"
             if abs(share - 1.0) > self.tolerance:
-                remarks.append(f'{off}: shear.contact = "disc" takes that into account')
+                known = 'shear.contact = "disc" takes that into account'
+                none = 'contact.model = "cohesive" leaves that out'
+                remarks.append(f"{off}: {known if setting.takes_disc else none}")
         if not spectrum.bond_made and rms > solid.shear_modulus:
             times = f"{rms / solid.shear_modulus:.3g} times the shear modulus"
             remarks.append(
