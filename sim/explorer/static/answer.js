@@ -62,12 +62,15 @@ export function current(state, name) {
   return found && isCurrent(state, name) && !found.answer.faults ? found.answer : null;
 }
 
-/** Return the names of answers that are due. What depends on the curves waits for them, and words for a gesture's end.
+/** Answers that wait for the end of a gesture, and for each other. */
+export const LATE = ["words", "contact", "band"];
+
+/** Return the names of answers that are due. Those that depend on the curves wait for them.
  * @param {State} state */
 export function due(state) {
   const names = Object.keys(QUESTIONS).filter((name) => !isCurrent(state, name));
-  if (names.includes("curves")) return names.filter((name) => name === "before" || name === "curves");
-  const late = ["words", "contact", ...(state.view.figure === "motion" ? ["others"] : [])];
+  if (names.includes("curves")) return names.filter((name) => ["before", "curves", "shown"].includes(name));
+  const late = state.view.figure === "motion" ? [...LATE, "others"] : LATE;
   return state.dragging ? names.filter((name) => !late.includes(name)) : names;
 }
 
