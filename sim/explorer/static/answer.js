@@ -74,16 +74,25 @@ export function due(state) {
   return state.dragging ? names.filter((name) => !late.includes(name)) : names;
 }
 
-/** Return in words how numbers differ from the present ones, such as "P = 4 mN"; "" if they do not.
+/** Return numbers of sliders in words, such as "P = 4 mN".
+ * @param {State} state
+ * @param {Values} values */
+export function named({ start }, values) {
+  const sliders = start.sliders.filter(({ key }) => key in values);
+  return sliders.map(({ key, symbol, unit }) => {
+    const name = lettered(symbol).join("") || key.split(".").at(-1);
+    return `${name} = ${engineering(values[key], unit)}`;
+  });
+}
+
+/** Return in words how numbers differ from the present ones; "" if they do not.
  * @param {State} state
  * @param {Values} of */
-export function differences({ start, values }, of) {
-  const words = start.sliders
-    .filter(({ key }) => key in of && of[key] !== values[key])
-    .map(({ key, symbol, unit }) => {
-      const name = symbol ? lettered(symbol).join("") : (key.split(".").at(-1) ?? key);
-      return `${name} = ${engineering(of[key], unit)}`;
-    });
+export function differences(state, of) {
+  const words = named(
+    state,
+    Object.fromEntries(Object.entries(of).filter(([key, value]) => value !== state.values[key])),
+  );
   return words.length > 3 ? `${words.slice(0, 3).join(", ")}, and ${words.length - 3} more` : words.join(", ");
 }
 

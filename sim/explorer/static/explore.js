@@ -183,10 +183,10 @@ const sliderOf = (key) =>
 async function read(key, text) {
   const began = epoch;
   const field = $(`text ${key}`);
-  const shown = change.textOf(state, sliderOf(key)).split(" ").slice(1).join(" ");
-  const isBare = /^[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?$/i.test(text.trim());
-  const unit = shown.replaceAll("µ", "u").replaceAll("²", "^2").replaceAll("³", "^3");
-  const words = isBare ? `${text.trim().replace(",", ".")} ${unit}`.trim() : text;
+  const number = text.trim().replace(",", ".");
+  const isBare = number !== "" && Number.isFinite(Number(number));
+  const [, ...unit] = change.textOf(state, sliderOf(key)).split(" ");
+  const words = isBare ? [number, ...unit].join(" ") : text;
   field.setAttribute("aria-busy", "true");
   try {
     const found = await ask("curves", { values: { ...state.values, [key]: words } });

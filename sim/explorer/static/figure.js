@@ -122,12 +122,10 @@ export function strokes(x, y, right, up) {
   /** @type {[number, number][]} */
   let column = [];
   const leave = () => {
-    if (column.length <= 4 || x.length < 1000) run.push(...column);
-    else {
-      const order = column.map(([, height], place) => [height, place]).sort((one, other) => one[0] - other[0]);
-      const places = new Set([0, order[0][1], order[order.length - 1][1], column.length - 1]);
-      run.push(...[...places].sort((one, other) => one - other).map((place) => column[place]));
-    }
+    const heights = column.map(([, height]) => height);
+    const few = [0, heights.indexOf(Math.min(...heights)), heights.indexOf(Math.max(...heights)), heights.length - 1];
+    const places = [...new Set(x.length < 1000 ? heights.keys() : few)].sort((one, other) => one - other);
+    run.push(...places.filter((place) => place in column).map((place) => column[place]));
     column = [];
   };
   for (let place = 0; place < x.length; place += 1) {
@@ -243,7 +241,8 @@ export function frames(panels, width, shared = true) {
     top += height + (shared ? GAP : GAP + BOTTOM);
     return row;
   });
-  return { left: LEFT, right, rows, height: rows[rows.length - 1][1] + BOTTOM };
+  const height = (rows.at(-1)?.[1] ?? TOP) + BOTTOM;
+  return { left: LEFT, right, rows, height };
 }
 
 /** Return a figure of panels above each other. Names of its parts begin with `id`, one for each figure of a page.

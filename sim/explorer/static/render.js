@@ -1,6 +1,6 @@
 // The page that belongs to a state.
 
-import { current, differences, isCurrent, isDescribed, nameOfRun } from "./answer.js";
+import { current, differences, isCurrent, isDescribed, nameOfRun, named } from "./answer.js";
 import { figure, frames, path, placed, ticked } from "./figure.js";
 import { picture, ratio, reading } from "./live.js";
 import { $, h, put } from "./node.js";
@@ -114,7 +114,7 @@ function choices(state) {
   put("percent", {}, `${level} %`);
   const here = start.points.findIndex((point) => Object.entries(point).every(([key, value]) => values[key] === value));
   const points = start.points.map((point, place) =>
-    h("option", { value: String(place), selected: place === here }, pointOf(state, point)),
+    h("option", { value: String(place), selected: place === here }, named(state, point).join(", ")),
   );
   put("points", { hidden: !points.length });
   put("point", {}, h("option", { value: "", selected: here < 0 }, "none of them"), ...points);
@@ -123,17 +123,6 @@ function choices(state) {
   );
   const legend = h("legend", { class: "seen" }, "What reduces the adhesion");
   put("mechanisms", { hidden: !mechanisms.length }, legend, ...mechanisms);
-}
-
-/** Return a point of the sweep in words.
- * @param {State} state
- * @param {import("./state.js").Values} point */
-function pointOf({ start }, point) {
-  const words = Object.entries(point).map(([key, value]) => {
-    const { symbol, unit } = /** @type {Slider} */ (start.sliders.find((slider) => slider.key === key));
-    return `${symbol ? lettered(symbol).join("") : key} = ${engineering(value, unit)}`;
-  });
-  return words.join(", ");
 }
 
 /** Show the sliders in their groups.
@@ -158,7 +147,7 @@ function sliders(state) {
   for (const { key } of start.sliders) {
     const field = $(`text ${key}`);
     if (isTyped(field)) continue;
-    const text = refusal?.typed && refusal.key === key ? refusal.text : $(key).ariaValueText;
+    const text = refusal?.typed && refusal.key === key ? refusal.text : $(key).getAttribute("aria-valuetext");
     if (field.value !== text || field.dataset.shown !== text) field.value = field.dataset.shown = text;
   }
 }
@@ -181,7 +170,7 @@ function controlOf(state, slider, refusal, number) {
   const lengths = [option("", "correlation length"), option("1", "wavelength of the same energy")];
   const choice = h("select", { id: "meaning", "aria-label": "What the length is" }, ...lengths);
   const ends = { type: "range", id: key, min: 0, max: STEPS, step: 1 };
-  const place = Math.min(STEPS, Math.max(0, placeOf(slider, state.values[key], STEPS)));
+  const place = placeOf(slider, state.values[key], STEPS);
   const field = { type: "text", id: `text ${key}`, "aria-label": `${meaning}, with its unit` };
   const quiet = { autocomplete: "off", spellcheck: "false", "aria-invalid": String(Boolean(refusal)) };
   const fault = { id: `fault ${key}`, class: "fault", role: "alert", hidden: !refusal };
@@ -213,7 +202,7 @@ function controlOf(state, slider, refusal, number) {
  * @param {any} number */
 function interval(slider, number) {
   if (!number || ![number.low, number.high].every(Number.isFinite)) return [];
-  const [from, to] = [number.low, number.high].map((end) => Math.min(STEPS, Math.max(0, placeOf(slider, end, STEPS))));
+  const [from, to] = [number.low, number.high].map((end) => placeOf(slider, end, STEPS));
   const box = { viewBox: `0 0 ${STEPS} 4`, preserveAspectRatio: "none" };
   const bar = h("rect", { x: from, y: 0, width: Math.max(2, to - from), height: 4 });
   return [h("svg", { ...box, role: "img", "aria-label": "95 % interval of the fit" }, bar)];
@@ -422,17 +411,17 @@ function moment({ motion, start }) {
   const { left, right, rows } = frames(drawn.panels, drawn.width, drawn.shared);
   return drawn.panels.flatMap((panel, k) => {
     const [top, bottom] = rows[k];
-    const right_of = placed(panel.x, left, right);
+    const acrossOf = placed(panel.x, left, right);
     const loop = panel.marks.find(({ name }) => name === "loop");
     if (!loop) {
-      const across = right_of(motion.time * scaled(start.duration, "s")[0]).toFixed(1);
+      const across = acrossOf(motion.time * scaled(start.duration, "s")[0]).toFixed(1);
       return [path(`M${across} ${top}V${bottom}`, { stroke: COLOURS.fluctuations, "stroke-width": 1.5 })];
     }
     const last = motion.columns.t.findLastIndex((t) => Number(t) <= motion.time);
     const place = Math.min(loop.x.length - 1, last);
     const [across, along] = [loop.x[place] ?? null, loop.y[place] ?? null];
     if (across === null || along === null) return [];
-    const at = { cx: right_of(across), cy: placed(panel.y, bottom, top)(along) };
+    const at = { cx: acrossOf(across), cy: placed(panel.y, bottom, top)(along) };
     return [h("circle", { ...at, r: 5, fill: COLOURS.fluctuations })];
   });
 }
@@ -446,8 +435,6 @@ function contact(state, { isDark, words: room }) {
   if (!found) return;
   once("contact", [found, isDark, room], () => {
     put("scene", {}, found.words);
-    put("contact", { hidden: !found.panels.length });
-    if (!found.panels.length) return;
     const look = theme(isDark);
     const width = Math.max(300, Math.min(room, 460));
     const shown = described(found.panels, look);
@@ -457,6 +444,7 @@ function contact(state, { isDark, words: room }) {
       return { ...panel, height: Math.max(30, (right - left) * ratio) };
     });
     const title = "The sphere from the side, to scale, and the contact circle from above";
-    put("contact", {}, figure(scaled, { id: "contact", width, theme: look, title, description: found.words }));
+    const about = { id: "contact", width, theme: look, title, description: found.words };
+    put("contact", { hidden: !shown.length }, ...(shown.length ? [figure(scaled, about)] : []));
   });
 }

@@ -368,14 +368,14 @@ export function begun(state, { values, time, words }) {
  * @returns {State} */
 export const withMotion = (state, change) => ({ ...state, motion: { ...state.motion, ...change } });
 
-/** Return the place of a value on its slider.
+/** Return the place of a value on its slider, at most an end of it.
  * @param {Slider} slider
  * @param {number} value
  * @param {number} steps */
 export function placeOf(slider, value, steps) {
-  const scale = slider.logarithmic ? Math.log : (/** @type {number} */ x) => x;
-  const [low, high, at] = [slider.low, slider.high, value].map(scale);
-  return Math.round((steps * (at - low)) / (high - low));
+  const scale = slider.logarithmic ? Math.log : Number;
+  const [low, high, at] = [slider.low, slider.high, value].map((one) => scale(one));
+  return Math.min(steps, Math.max(0, Math.round((steps * (at - low)) / (high - low))));
 }
 
 /** Return the value at a place of a slider, with four digits.
