@@ -212,6 +212,8 @@ class Page:
             "preview": list(previews(self.scenario)),
             "members": self.scenario.ensemble.members,
             "data": self._first,
+            # of a single point there are no others
+            "alone": not self._asked.sweep,
         }
 
     def _is_slidable(self, points: list[dict[str, float]]) -> bool:

@@ -28,11 +28,12 @@ export const QUESTIONS = {
   contact: (state) => ({ values: state.values, speed: speedOf(state) }),
   // the first one imports modules for seconds
   band: (state) => ({ values: state.values }),
-  others: (state) => ({
-    values: state.values,
-    figure: state.view.figure === "motion" ? "motion" : drawn(state),
-    loads: state.view.loads,
-  }),
+  others: (state) =>
+    (!state.start.alone || state.view.loads) && {
+      values: state.values,
+      figure: state.view.figure === "motion" ? "motion" : drawn(state),
+      loads: state.view.loads,
+    },
 };
 
 /** Addresses of the server that differ from the name of the answer. */
@@ -59,7 +60,8 @@ export function isCurrent(state, name) {
  * @param {string} name */
 export function current(state, name) {
   const found = state.answers[name];
-  return found && isCurrent(state, name) && !found.answer.faults ? found.answer : null;
+  const isAnswer = found && QUESTIONS[name](state) && isCurrent(state, name);
+  return isAnswer && !found.answer.faults ? found.answer : null;
 }
 
 /** Answers that wait for the end of a gesture, and for each other. */

@@ -11,7 +11,7 @@ import { engineering } from "./notation.js";
 /** What the server tells once.
  * @typedef {{ title: string, question: string, path: string, stamp: string, sliders: Slider[], points: Values[],
  *   mechanisms: { key: string, name: string, on: number }[], figures: Figure[], preview: string[], members: number,
- *   duration: number, speed: number, mount: string, data: string | null }} Start */
+ *   duration: number, speed: number, mount: string, data: string | null, alone: boolean }} Start */
 /** @typedef {{ share: number, absolute: boolean, first: boolean, loads: boolean, figure: Figure }} View */
 /** @typedef {{ values: Values, view: View }} Snapshot */
 /** An answer with the question that it belongs to.

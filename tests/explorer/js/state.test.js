@@ -59,6 +59,16 @@ test("curves are due after a move, and words only after the gesture", () => {
   assert.ok(["words", "band"].every((name) => due(change.rested(state)).includes(name)));
 });
 
+test("a scenario of a single point has no others but other loads", () => {
+  const state = { ...opened(), start: { ...START, alone: true } };
+  assert.ok(!due(state).includes("others"));
+  const loads = change.viewed(state, { loads: true });
+  assert.ok(due(loads).includes("others"));
+  const shown = change.answered(loads, "others", QUESTIONS.others(loads), { others: [{}] });
+  assert.equal(current(shown, "others").others.length, 1);
+  assert.equal(current(change.viewed(shown, { loads: false }), "others"), null);
+});
+
 test("the figure of a table is asked for with the curves, and the refusal of other numbers does not take its place", () => {
   const first = { ...opened(), table: "t" };
   const shown = (state, answer) => change.answered(state, "shown", QUESTIONS.shown(state), answer);
