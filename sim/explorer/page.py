@@ -165,7 +165,8 @@ class Page:
         self, values: Mapping[str, Any], figure: str, table: str | None = None
     ) -> dict[str, Any]:
         """Return the panels and the sentence of the figure "data", "spread" or "map"."""
-        scene = self.read(values)
+        # predictions of steady sliding need none of what the members of a run need
+        scene = self.read(values, built=figure != "data")
         if figure == "map" and self._map:
             return self._map.answer(scene, self._numbers(scene))
         if figure == "data" and (measured := self.tables.get(table)):

@@ -110,7 +110,7 @@ class Guarded:
             "/words": lambda query: self._page.words(query.values),
             "/band": lambda query: self._page.band(query.values),
             "/contact": lambda query: contact_to_scale(
-                self._page.read(query.values), query.speed
+                self._page.read(query.values, built=False), query.speed
             ),
             "/data": lambda query: {"data": self._page.add(query.text, query.name)},
             "/file": lambda query: self._followed(),

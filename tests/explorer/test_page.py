@@ -346,6 +346,20 @@ def test_the_contact_is_drawn_in_one_unit_with_its_circle_and_its_map(lens):
     assert lifted["panels"] == [] and "open" in lifted["words"]
 
 
+def test_curves_measured_values_and_contact_wait_for_no_noise_of_members(monkeypatch):
+    page = Page(sim.load("scenarios/pdms_lens.toml"))
+    table = page.add("speed [mm/s],contact_area [mm^2]\n1,0.04\n9,0.03", "own.csv")
+
+    def refused(shear, solid, cell):
+        raise AssertionError("the process is built, which takes a second")
+
+    monkeypatch.setattr(type(page.scenario.fluctuations), "process", refused)
+    values = {"shear.spectrum.hurst": 0.7}
+    assert page.answer(values, 0.1, "speed", table)["data"]["points"]
+    assert page.figure(values, "data", table)["panels"]
+    assert contact_to_scale(page.read(values, built=False), 1e-3)["panels"]
+
+
 def test_a_picture_of_a_map_is_blue_below_zero_and_its_second_axis_points_upwards():
     values = np.zeros((3, 3))
     values[2, 0], values[0, 2] = -2.0, 2.0
