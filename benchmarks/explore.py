@@ -45,8 +45,8 @@ WATCH = """(() => {
         });
     };
     document.addEventListener("DOMContentLoaded", () => {
-        const watch = (changes) => changes.some(({ addedNodes }) => addedNodes.length) && drawn();
-        new MutationObserver(watch).observe(document.getElementById("plot"), { childList: true });
+        const plot = document.getElementById("plot");
+        new MutationObserver(drawn).observe(plot, { attributeFilter: ["data-of"] });
     });
 })()"""
 

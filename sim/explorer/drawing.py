@@ -1,9 +1,12 @@
 """The contact to scale: profiles of sphere and half-space, and a map of the stress around the contact circle."""
 
+import base64
+import io
 import math
 from typing import Any, cast
 
 import numpy as np
+from PIL import Image
 
 from sim.parts.exchange import Array
 from sim.scenario.scenario import Scenario
@@ -14,6 +17,8 @@ from sim.study.curves import curves
 _PROFILE, _MAP, _WIDE = 161, 128, 4.0
 #: Pixels of a single wave, below which it is not drawn.
 _FINE = 4.0
+#: Colours of the most negative and of the most positive number; levels of a colour.
+_BLUE, _RED, _LEVELS = (33, 102, 172), (178, 24, 43), 127
 
 
 def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
@@ -47,8 +52,24 @@ def contact(scenario: Scenario, speed: float) -> dict[str, Any]:
         surface, sphere = scenario.contact.heights(np.abs(x), *held)
     profiles = {"x": listed(x), "surface": listed(surface), "sphere": listed(sphere)}
     stress = _stress(scenario, at_speed, 2.0 * wide)
-    rows = None if stress is None else [listed(row) for row in np.round(stress, -1)]
-    return result | profiles | {"side": 2.0 * wide, "stress": rows}
+    return result | profiles | {"side": 2.0 * wide, "stress": stress}
+
+
+def picture(values: Array) -> str:
+    """Return a square map as the address of a picture, blue where it is negative and red where it is positive.
+
+    The first axis of the map runs to the right, the second one upwards.
+    """
+    most = float(np.max(np.abs(values))) or 1.0
+    levels = np.round(_LEVELS * (1.0 + values / most)).astype(np.uint8)
+    image = Image.fromarray(np.flipud(levels.T), "P")
+    shares = np.abs(np.arange(2 * _LEVELS + 1) / _LEVELS - 1.0)[:, np.newaxis]
+    blue, red = (255.0 + (np.array(ends) - 255.0) * shares for ends in (_BLUE, _RED))
+    colours = np.concatenate([blue[:_LEVELS], red[_LEVELS:]])
+    image.putpalette(np.round(colours).astype(np.uint8).tobytes())
+    file = io.BytesIO()
+    image.save(file, "PNG")
+    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"
 
 
 def listed(values: Any) -> list[float | None]:

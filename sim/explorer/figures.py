@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from sim.ensemble.diagnosis import onset, stability
-from sim.explorer.drawing import listed
+from sim.explorer.drawing import contact, listed, picture
 from sim.parts.exchange import Array
 from sim.quantities import QUANTITIES
 from sim.scenario.scenario import Scenario
@@ -32,6 +32,63 @@ def axis(label: str, unit: str, log: bool = False, **choices: Any) -> dict[str, 
 
 def _mark(kind: str, x: Array, y: Array, colour: str, **more: Any) -> dict[str, Any]:
     return {"kind": kind, "x": listed(x), "y": listed(y), "colour": colour} | more
+
+
+def contact_to_scale(scenario: Scenario, speed: float) -> dict[str, Any]:
+    """Return a cut through sphere and half-space and the contact from above, in steady sliding at a speed [m/s].
+
+    The picture ``waves`` shows the fluctuations alone; it is None without them. A panel whose height is "scale" has one
+    scale along both axes.
+    """
+    found = contact(scenario, speed)
+    radius, energy = found["radius"], found["fluctuation_energy"]
+    if not radius:
+        words = "In steady sliding the contact is open."
+        return {"radius": 0.0, "panels": [], "words": words, "waves": None}
+    factor, unit = scaled(found["side"] / 2.0, "m")
+    half, x = factor * found["side"] / 2.0, factor * np.array(found["x"])
+    heights = factor * np.array([found["surface"], found["sphere"]])
+    across, upwards = (
+        axis(name, unit, low=-half, high=half)
+        for name in ("along the sliding direction", "across")
+    )
+    depth = axis("z", unit, low=float(heights.min()), high=float(heights.max()))
+    profiles = [
+        _mark("line", x, y, colour)
+        for y, colour in zip(heights, ("rest", ""), strict=True)
+    ]
+    stress, words, ends = found["stress"], "", np.array([-half, half])
+    marks = []
+    if stress is not None:
+        marks.append(_mark("image", ends, ends, "", name=picture(stress)))
+        most = engineering(float(np.max(np.abs(stress))), "Pa")
+        words = (
+            f"; blue is −{most} and red +{most} of one realisation of the shear stress"
+        )
+    ink, angles = "" if stress is None else "black", np.linspace(0.0, 2.0 * np.pi, 181)
+    circles = (radius, {"width": 2}), (found["jkr_radius"], {"width": 1, "dash": "2 4"})
+    for size, look in circles:
+        if size:
+            y = factor * size * np.sin(angles)
+            marks.append(_mark("line", factor * size * np.cos(angles), y, ink, **look))
+    waves = None
+    if stress is not None and energy > 0.0:
+        href = picture(stress - stress.mean())
+        waves = {"href": href, "side": found["side"], "energy": energy}
+    sliding = f"In steady sliding at {engineering(speed, 'm/s')}"
+    drawn = (
+        "Above: a cut through sphere and half-space, heights and widths to one scale."
+        f" Below: the contact circle; dotted: JKR's circle{words}."
+    )
+    return {
+        "radius": radius,
+        "panels": [
+            {"x": across, "y": depth, "height": "scale", "marks": profiles},
+            {"x": across, "y": upwards, "height": "scale", "marks": marks},
+        ],
+        "words": f"{sliding}: contact radius {engineering(radius, 'm')}. {drawn}",
+        "waves": waves,
+    }
 
 
 def _plain(words: str) -> str:

@@ -165,7 +165,8 @@ class Page:
         self, values: Mapping[str, Any], figure: str, table: str | None = None
     ) -> dict[str, Any]:
         """Return the panels and the sentence of the figure "data", "spread" or "map"."""
-        scene = self.read(values)
+        # predictions of steady sliding need none of what the members of a run need
+        scene = self.read(values, built=figure != "data")
         if figure == "map" and self._map:
             return self._map.answer(scene, self._numbers(scene))
         if figure == "data" and (measured := self.tables.get(table)):
@@ -212,6 +213,8 @@ class Page:
             "preview": list(previews(self.scenario)),
             "members": self.scenario.ensemble.members,
             "data": self._first,
+            # of a single point there are no others
+            "alone": not self._asked.sweep,
         }
 
     def _is_slidable(self, points: list[dict[str, float]]) -> bool:

@@ -25,7 +25,7 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from sim.explorer.connection import Connection
-from sim.explorer.drawing import contact
+from sim.explorer.figures import contact_to_scale
 from sim.explorer.page import Page, Refused as BadValues, stamp_of
 from sim.scenario.scenario import Scenario
 from sim.units.errors import BadInput
@@ -109,8 +109,8 @@ class Guarded:
             ),
             "/words": lambda query: self._page.words(query.values),
             "/band": lambda query: self._page.band(query.values),
-            "/contact": lambda query: contact(
-                self._page.read(query.values), query.speed
+            "/contact": lambda query: contact_to_scale(
+                self._page.read(query.values, built=False), query.speed
             ),
             "/data": lambda query: {"data": self._page.add(query.text, query.name)},
             "/file": lambda query: self._followed(),

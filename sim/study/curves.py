@@ -1,6 +1,5 @@
 """Curves of steady sliding over the speed: variables of a dataset, shares of the lost area, and the speed of a loss."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,18 +87,21 @@ def speeds_of_loss(
     """
     from scipy import optimize
 
-    def surplus(logarithm: float) -> float:
-        return float(curves(scenario, np.exp([logarithm]))["area_ratio"][0]) - (
-            1.0 - share
-        )
-
     if ratio is None:
         ratio = curves(scenario, speeds)["area_ratio"]
     left = ratio - (1.0 - share)
     places = np.flatnonzero((left[:-1] > 0.0) != (left[1:] > 0.0))
-    ends: Sequence[tuple[float, float]] = [
-        (np.log(speeds[k]), np.log(speeds[k + 1])) for k in places
-    ]
+    logarithms = np.log(speeds).tolist()
+    # the ends of an interval are known, with the signs by which it was found
+    known = dict(zip(logarithms, left.tolist(), strict=True))
+
+    def surplus(logarithm: float) -> float:
+        if logarithm in known:
+            return known[logarithm]
+        area_ratio = curves(scenario, np.exp([logarithm]))["area_ratio"]
+        return float(area_ratio[0]) - (1.0 - share)
+
+    ends = [(logarithms[k], logarithms[k + 1]) for k in places]
     return [
         float(np.exp(optimize.brentq(surplus, low, high, xtol=1e-12, rtol=1e-12)))
         for low, high in ends

@@ -316,6 +316,8 @@ def test_a_table_with_decimal_commas_is_dropped_fitted_saved_and_opened_again(
             "not the exact speed",
         )
         assert page.locator(".track svg").count() == 1
+        idle(page)
+        wait(page, lambda: "bonds.critical_speed" in page.url, "not in the address")
         link, words = page.url, lost(page)
     with (
         explored(path, "--state", link) as (_, address),
@@ -1088,6 +1090,33 @@ def test_curves_are_read_by_keyboard_and_as_a_table(shown):
     assert shown.locator("#plot svg title").text_content()
     shown.locator("#numbers summary").click()
     wait(shown, lambda: shown.locator("#numbers tr").count() > 50, "no table")
+
+
+def test_a_move_keeps_the_elements_of_the_figure_and_changes_no_other_slider(shown):
+    idle(shown)
+    drawn = shown.locator("#plot [data-name=area]").get_attribute("d")
+    shown.evaluate(
+        """() => {
+            const all = (where) => [...document.querySelectorAll(where)];
+            window.figureBefore = all("#plot svg, #plot text, #plot [data-name=area]");
+            window.changed = new Set();
+            new MutationObserver((changes) => changes.forEach(({ target }) => {
+                const slider = (target.closest ? target : target.parentElement)?.closest(".slider");
+                if (slider) changed.add(slider.querySelector("[type=range]").id);
+            })).observe(document.getElementById("groups"), {
+                subtree: true, childList: true, attributes: true, characterData: true });
+        }"""
+    )
+    enter(shown, "2.2 mm")
+    wait(shown, lambda: value(shown) == "2.2 mm", "not read")
+    idle(shown)
+    assert shown.locator("#plot [data-name=area]").get_attribute("d") != drawn
+    kept = (
+        "[figureBefore.length, figureBefore.filter((item) => item.isConnected).length]"
+    )
+    before, after = shown.evaluate(kept)
+    assert before > 20 and after == before
+    assert shown.evaluate("[...changed]") == [RADIUS]
 
 
 AXE = Path(sim.__file__).parents[1] / "node_modules" / "axe-core" / "axe.min.js"

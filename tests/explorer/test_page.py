@@ -1,5 +1,6 @@
 """The page of ``sim explore``: curves of steady sliding, sliders, what is taken away, and messages."""
 
+import base64
 import csv
 import io
 import itertools
@@ -13,12 +14,13 @@ import numpy as np
 import pytest
 from helpers.commands import LENS as MOUNTED, sim as command
 from numpy.testing import assert_allclose
+from PIL import Image
 
 import sim
 from sim.ensemble.diagnosis import slider_body
 from sim.explorer import take
-from sim.explorer.drawing import contact
-from sim.explorer.figures import rings
+from sim.explorer.drawing import contact, picture
+from sim.explorer.figures import contact_to_scale, rings
 from sim.explorer.job import ensemble, fitted, planned
 from sim.explorer.page import Page, Refused, previews
 from sim.explorer.server import Server, state_of
@@ -321,6 +323,51 @@ def test_the_drawing_has_the_contact_to_scale(lens):
     assert_allclose(stress.mean(), exact["shear_stress"][0], rtol=0.05)
     # waves shorter than two pixels are left out, so the map has at most the rms of the spectrum
     assert 0.2 * 6e4 < stress.std() < 1.1 * 6e4
+
+
+def test_the_contact_is_drawn_in_one_unit_with_its_circle_and_its_map(lens):
+    scene = sim.load(lens)
+    found, drawn = contact(scene, 1e-3), contact_to_scale(scene, 1e-3)
+    cut, above = drawn["panels"]
+    half = cut["x"]["high"]
+    assert above["x"]["low"] == above["y"]["low"] == -half == -above["y"]["high"]
+    assert_allclose(cut["marks"][0]["y"], 1e6 * np.array(found["surface"]), rtol=1e-12)
+    image, circle, dotted = above["marks"]
+    assert image["kind"] == "image" and image["x"] == image["y"] == [-half, half]
+    for mark, name in ((circle, "radius"), (dotted, "jkr_radius")):
+        assert_allclose(np.hypot(mark["x"], mark["y"]), 1e6 * found[name], rtol=1e-12)
+    assert_allclose(2e-6 * half, found["side"], rtol=1e-12)
+    assert drawn["waves"]["energy"] == found["fluctuation_energy"] > 0.0
+    ripple = sim.load("scenarios/masking.toml").with_values({})
+    short = ripple.with_values({"shear.spectrum.wavelength": 1e-6})
+    without = contact_to_scale(short, 3e-3)
+    assert without["waves"] is None and len(without["panels"][1]["marks"]) == 2
+    lifted = contact_to_scale(scene.with_values({"contact.load": -1.0}), 1e-3)
+    assert lifted["panels"] == [] and "open" in lifted["words"]
+
+
+def test_curves_measured_values_and_contact_wait_for_no_noise_of_members(monkeypatch):
+    page = Page(sim.load("scenarios/pdms_lens.toml"))
+    table = page.add("speed [mm/s],contact_area [mm^2]\n1,0.04\n9,0.03", "own.csv")
+
+    def refused(shear, solid, cell):
+        raise AssertionError("the process is built, which takes a second")
+
+    monkeypatch.setattr(type(page.scenario.fluctuations), "process", refused)
+    values = {"shear.spectrum.hurst": 0.7}
+    assert page.answer(values, 0.1, "speed", table)["data"]["points"]
+    assert page.figure(values, "data", table)["panels"]
+    assert contact_to_scale(page.read(values, built=False), 1e-3)["panels"]
+
+
+def test_a_picture_of_a_map_is_blue_below_zero_and_its_second_axis_points_upwards():
+    values = np.zeros((3, 3))
+    values[2, 0], values[0, 2] = -2.0, 2.0
+    content = picture(values).removeprefix("data:image/png;base64,")
+    image = Image.open(io.BytesIO(base64.b64decode(content))).convert("RGB")
+    assert image.getpixel((2, 2)) == (33, 102, 172)
+    assert image.getpixel((0, 0)) == (178, 24, 43)
+    assert image.getpixel((1, 1)) == (255, 255, 255)
 
 
 def test_a_band_that_takes_too_long_is_not_begun(lens):

@@ -28,11 +28,12 @@ export const QUESTIONS = {
   contact: (state) => ({ values: state.values, speed: speedOf(state) }),
   // the first one imports modules for seconds
   band: (state) => ({ values: state.values }),
-  others: (state) => ({
-    values: state.values,
-    figure: state.view.figure === "motion" ? "motion" : drawn(state),
-    loads: state.view.loads,
-  }),
+  others: (state) =>
+    (!state.start.alone || state.view.loads) && {
+      values: state.values,
+      figure: state.view.figure === "motion" ? "motion" : drawn(state),
+      loads: state.view.loads,
+    },
 };
 
 /** Addresses of the server that differ from the name of the answer. */
@@ -59,28 +60,41 @@ export function isCurrent(state, name) {
  * @param {string} name */
 export function current(state, name) {
   const found = state.answers[name];
-  return found && isCurrent(state, name) && !found.answer.faults ? found.answer : null;
+  const isAnswer = found && QUESTIONS[name](state) && isCurrent(state, name);
+  return isAnswer && !found.answer.faults ? found.answer : null;
 }
 
-/** Return the names of answers that are due. What depends on the curves waits for them, and words for a gesture's end.
+/** Answers that wait for the end of a gesture, and for each other. */
+export const LATE = ["words", "contact", "band"];
+
+/** Return the names of answers that are due. Those that depend on the curves wait for them.
  * @param {State} state */
 export function due(state) {
   const names = Object.keys(QUESTIONS).filter((name) => !isCurrent(state, name));
-  if (names.includes("curves")) return names.filter((name) => name === "before" || name === "curves");
-  const late = ["words", "contact", ...(state.view.figure === "motion" ? ["others"] : [])];
+  if (names.includes("curves")) return names.filter((name) => ["before", "curves", "shown"].includes(name));
+  const late = state.view.figure === "motion" ? [...LATE, "others"] : LATE;
   return state.dragging ? names.filter((name) => !late.includes(name)) : names;
 }
 
-/** Return in words how numbers differ from the present ones, such as "P = 4 mN"; "" if they do not.
+/** Return numbers of sliders in words, such as "P = 4 mN".
+ * @param {State} state
+ * @param {Values} values */
+export function named({ start }, values) {
+  const sliders = start.sliders.filter(({ key }) => key in values);
+  return sliders.map(({ key, symbol, unit }) => {
+    const name = lettered(symbol).join("") || key.split(".").at(-1);
+    return `${name} = ${engineering(values[key], unit)}`;
+  });
+}
+
+/** Return in words how numbers differ from the present ones; "" if they do not.
  * @param {State} state
  * @param {Values} of */
-export function differences({ start, values }, of) {
-  const words = start.sliders
-    .filter(({ key }) => key in of && of[key] !== values[key])
-    .map(({ key, symbol, unit }) => {
-      const name = symbol ? lettered(symbol).join("") : (key.split(".").at(-1) ?? key);
-      return `${name} = ${engineering(of[key], unit)}`;
-    });
+export function differences(state, of) {
+  const words = named(
+    state,
+    Object.fromEntries(Object.entries(of).filter(([key, value]) => value !== state.values[key])),
+  );
   return words.length > 3 ? `${words.slice(0, 3).join(", ")}, and ${words.length - 3} more` : words.join(", ");
 }
 

@@ -2,16 +2,31 @@
 
 let token = "";
 
+/** Keep a text for a reload in this tab, if there is a storage with room for it; a frame may have none.
+ * @param {string} name
+ * @param {string} text */
+function keep(name, text) {
+  try {
+    sessionStorage.setItem(name, text);
+  } catch {
+    // nothing is kept
+  }
+}
+
+/** @param {string} name */
+function kept(name) {
+  try {
+    return sessionStorage.getItem(name);
+  } catch {
+    return null;
+  }
+}
+
 /** Take the token of an address, or the one of an earlier visit in this tab. Return false if there is none.
  * @param {URLSearchParams} address */
 export function authorised(address) {
-  const given = address.get("token");
-  try {
-    if (given) sessionStorage.setItem("token", given);
-    token = given ?? sessionStorage.getItem("token") ?? "";
-  } catch {
-    token = given ?? ""; // a frame may have no storage
-  }
+  token = address.get("token") ?? kept("token") ?? token;
+  keep("token", token);
   return token !== "";
 }
 
@@ -21,23 +36,13 @@ export const shareable = (words) => `${location.origin}/#token=${token}${words ?
 
 /** Keep something for a reload in this tab.
  * @param {any} content */
-export function store(content) {
-  try {
-    sessionStorage.setItem("page", JSON.stringify({ token, content }));
-  } catch {
-    // no storage, or no room
-  }
-}
+export const store = (content) => keep("page", JSON.stringify({ token, content }));
 
 /** Return what was kept for a reload, if it belongs to this server.
  * @returns {any} */
 export function stored() {
-  try {
-    const found = JSON.parse(sessionStorage.getItem("page") ?? "null");
-    return found?.token === token ? found.content : null;
-  } catch {
-    return null;
-  }
+  const found = JSON.parse(kept("page") ?? "null");
+  return found?.token === token ? found.content : null;
 }
 
 /** @param {string} path

@@ -1,10 +1,10 @@
 // The page of `sim explore`: gestures change the state, the state asks the server, and the page is drawn from the state.
 // All physics is computed by Python.
 
-import { ADDRESSES, QUESTIONS, due } from "./answer.js";
+import { ADDRESSES, LATE, QUESTIONS, due, isCurrent, isDescribed } from "./answer.js";
 import { ask, authorised, shareable, store, stored, stream } from "./connection.js";
-import { written } from "./figure.js";
-import { $, STEPS, build, drawn, now, rates, render } from "./render.js";
+import { $, put, written } from "./node.js";
+import { STEPS, drawn, isTyped, now, render } from "./render.js";
 import * as change from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
@@ -12,20 +12,21 @@ import * as change from "./state.js";
 const narrow = matchMedia("(max-width: 800px)");
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const quiet = matchMedia("(prefers-reduced-motion: reduce)");
-const screen = () => ({ isDark: dark.matches, isNarrow: narrow.matches });
+/** @type {import("./render.js").Screen} */
+const screen = { isDark: false, isNarrow: false, plot: 0, words: 0, reached: 0 };
 
 /** @type {State} */
 let state;
-let isScheduled = false;
+/** Number of the frame in which the state will be drawn, 0 if it is drawn. */
+let frame = 0;
 let address = "";
 /** Number of the gestures that take back what a text is read for. */
 let epoch = 0;
-/** @type {Set<string>} */
-const asked = new Set();
+/** Answers under way, by their names.
+ * @type {Map<string, Promise<any>>} */
+const asked = new Map();
 /** @type {AbortController | null} */
 let stopper = null;
-/** Ratio of the motion to real time that was reached. */
-let reached = 0;
 /** Questions that could not be answered, by their names. They are not asked again.
  * @type {Map<string, any>} */
 const failed = new Map();
@@ -38,10 +39,7 @@ Object.defineProperty(globalThis, "explored", { get: () => state });
 function complain(fault) {
   const text = fault instanceof Error ? fault.message : String(fault);
   if (state) update({ ...state, trouble: text });
-  else {
-    $("trouble").hidden = false;
-    $("trouble").textContent = text;
-  }
+  else put("trouble", { hidden: false }, text);
 }
 
 /** Take the next state, draw it within a frame, and ask for what it lacks.
@@ -49,58 +47,77 @@ function complain(fault) {
 function update(next) {
   if (next === state) return;
   state = next;
-  if (!isScheduled) {
-    isScheduled = true;
-    requestAnimationFrame(draw);
-  }
-  due(state).forEach(answer);
+  frame ||= requestAnimationFrame(draw);
+  const names = due(state).filter((name) => !change.same(failed.get(name), QUESTIONS[name](state)));
+  // one after the other, so that they take no time from curves that are asked for meanwhile
+  const late = names.find((name) => LATE.includes(name));
+  names.filter((name) => name === late || !LATE.includes(name)).forEach(answer);
   move();
 }
 
 function draw() {
-  isScheduled = false;
-  if (!state.dragging) remember();
-  render(state, screen());
-  if (state.view.figure === "motion") rates(state, reached);
+  cancelAnimationFrame(frame);
+  frame = 0;
+  render(state, screen);
+  // after the frame
+  if (!state.dragging && isCurrent(state, "curves")) setTimeout(remember);
+}
+
+/** Take the size of the page. It is measured only when it changes, because a width that is read between changes of the
+ * page makes the browser lay it out at once. */
+function measure() {
+  const [plot, words] = [$("plot").clientWidth, $("words").clientWidth];
+  const next = { isDark: dark.matches, isNarrow: narrow.matches, plot, words };
+  if (change.same({ ...screen, ...next }, screen)) return;
+  Object.assign(screen, next);
+  if (state) frame ||= requestAnimationFrame(draw);
+}
+
+/** Ask a question, unless its name is under way or it could not be answered, and take the answer.
+ * @param {string} name
+ * @param {any} question
+ * @param {(found: any) => void} take
+ * @param {any} key of the question, if another one would fail alike */
+function request(name, question, take, key = question) {
+  if (asked.has(name) || change.same(failed.get(name), key)) return;
+  const reply = ask(ADDRESSES.get(name) ?? name, question);
+  asked.set(name, reply);
+  reply
+    .then(async (found) => {
+      // numbers that the curves refuse are no longer those of the state
+      if (name === "shown") await asked.get("curves");
+      asked.delete(name);
+      take(found);
+    })
+    .catch((fault) => {
+      failed.set(name, key);
+      asked.delete(name);
+      complain(fault);
+    });
 }
 
 /** Ask for the answer of a name; what is changed meanwhile is asked after it.
  * @param {string} name */
-async function answer(name) {
+function answer(name) {
   const question = QUESTIONS[name](state);
-  if (asked.has(name) || change.same(failed.get(name), question)) return;
-  asked.add(name);
-  try {
-    const found = await ask(ADDRESSES.get(name) ?? name, question);
-    asked.delete(name);
+  request(name, question, (found) => {
     update(change.answered(state, name, question, found));
-    if (name === "curves") draw(); // at once, not in the next frame
-  } catch (fault) {
-    failed.set(name, question);
-    asked.delete(name);
-    complain(fault);
-  }
+    if (name === (isDescribed(state) ? "shown" : "curves")) draw(); // at once, not in the next frame
+  });
 }
 
 /** Ask for the next part of the motion. */
-async function move() {
-  const request = change.nextOfMotion(state);
-  if (!request || asked.has("motion") || change.same(failed.get("motion"), request.values)) return;
-  asked.add("motion");
-  try {
-    const found = await ask("motion", request);
-    asked.delete("motion");
-    if (found.faults) failed.set("motion", request.values);
+function move() {
+  const part = change.nextOfMotion(state);
+  if (!part) return;
+  const take = (/** @type {any} */ found) => {
+    if (found.faults) failed.set("motion", part.values);
     else if (state.view.figure === "motion") {
-      const isRestart = !request.run;
-      update(change.continued(state, request, found));
-      if (isRestart && !state.motion.paused) play();
+      update(change.continued(state, part, found));
+      if (!part.run && !state.motion.paused) play();
     }
-  } catch (fault) {
-    failed.set("motion", request.values);
-    asked.delete("motion");
-    complain(fault);
-  }
+  };
+  request("motion", part, take, part.values);
 }
 
 let last = 0;
@@ -126,11 +143,8 @@ function tick(time) {
   last = time;
   passed = [...passed.filter(([then]) => time - then < 1000), [time, state.motion.time]];
   const [[from, first]] = passed;
-  reached = time - from > 300 ? (state.motion.time - first) / ((time - from) / 1000) : 0;
-  if (!isScheduled) {
-    now(state, screen());
-    rates(state, reached);
-  }
+  screen.reached = time - from > 300 ? (state.motion.time - first) / ((time - from) / 1000) : 0;
+  if (!frame) now(state, screen);
   requestAnimationFrame(tick);
 }
 
@@ -169,10 +183,10 @@ const sliderOf = (key) =>
 async function read(key, text) {
   const began = epoch;
   const field = $(`text ${key}`);
-  const shown = change.textOf(state, sliderOf(key)).split(" ").slice(1).join(" ");
-  const isBare = /^[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?$/i.test(text.trim());
-  const unit = shown.replaceAll("µ", "u").replaceAll("²", "^2").replaceAll("³", "^3");
-  const words = isBare ? `${text.trim().replace(",", ".")} ${unit}`.trim() : text;
+  const number = text.trim().replace(",", ".");
+  const isBare = number !== "" && Number.isFinite(Number(number));
+  const [, ...unit] = change.textOf(state, sliderOf(key)).split(" ");
+  const words = isBare ? [number, ...unit].join(" ") : text;
   field.setAttribute("aria-busy", "true");
   try {
     const found = await ask("curves", { values: { ...state.values, [key]: words } });
@@ -194,40 +208,44 @@ async function read(key, text) {
   }
 }
 
+/** Return the state after a control was changed, by its name or its id.
+ * @type {Record<string, (control: any) => State>} */
+const CHANGES = {
+  figure: ({ value }) => change.viewed(state, { figure: value }),
+  absolute: ({ checked }) => change.viewed(state, { absolute: checked }),
+  first: ({ checked }) => change.viewed(state, { first: checked }),
+  loads: ({ checked }) => change.viewed(state, { loads: checked }),
+  meaning: ({ value }) => ({ ...state, wavelength: value !== "" }),
+  rate: ({ value }) => change.withMotion(state, { rate: Number(value) }),
+  mechanism: ({ value, checked }) => {
+    const full = state.start.mechanisms.find(({ key }) => key === value)?.on ?? 1;
+    return change.moved(state, { [value]: checked ? full : 0 });
+  },
+  point: ({ value }) => (value === "" ? { ...state } : change.moved(state, state.start.points[Number(value)])),
+};
+
 /** @param {string} id
  * @param {string} kind
  * @param {(event: any) => void} act */
 const on = (id, kind, act) => $(id).addEventListener(kind, act);
 
-/** Listen to the sliders, of which there may be many, in one place. */
+/** Listen to the controls, of which there may be many, in one place. */
 function listen() {
-  const keyOf = (/** @type {any} */ item) => (item.matches("#groups input[type=range]") ? item.id : "");
-  on("groups", "pointerdown", ({ target }) => keyOf(target) && update(change.released(state)));
-  on("groups", "focusout", ({ target }) => keyOf(target) && state.gesture && update(change.released(state)));
-  on("groups", "input", ({ target }) => {
-    const key = keyOf(target);
-    if (key) update(change.moved(state, { [key]: change.valueAt(sliderOf(key), Number(target.value), STEPS) }, key));
+  const isGesture = (/** @type {any} */ item) => item.type === "range" && item.id !== "at";
+  on("main", "pointerdown", ({ target }) => isGesture(target) && update(change.released(state)));
+  on("main", "focusout", ({ target }) => isGesture(target) && state.gesture && update(change.released(state)));
+  on("main", "input", ({ target }) => {
+    const [key, place] = [target.id, Number(target.value)];
+    if (key === "at") update({ ...state, reading: place });
+    else if (key === "level") update(change.viewed(state, { share: place / 100 }, key));
+    else if (isGesture(target))
+      update(change.moved(state, { [key]: change.valueAt(sliderOf(key), place, STEPS) }, key));
   });
-  on("groups", "change", ({ target }) => {
-    if (keyOf(target)) update(change.rested(state));
-    else if (target.id === "meaning") update({ ...state, wavelength: target.value !== "" });
+  on("main", "change", ({ target }) => {
+    const act = CHANGES[target.name || target.id];
+    if (act) update(act(target));
+    else if (isGesture(target)) update(change.rested(state));
     else if (target.id.startsWith("text ")) read(target.id.slice(5), target.value);
-  });
-  on("level", "pointerdown", () => update(change.released(state)));
-  on("level", "input", () => update(change.viewed(state, { share: Number($("level").value) / 100 }, "level")));
-  on("level", "change", () => update(change.rested(state)));
-  on("level", "focusout", () => update(change.released(state)));
-  for (const name of /** @type {const} */ (["absolute", "first", "loads"])) {
-    on(name, "change", () => update(change.viewed(state, { [name]: $(name).checked })));
-  }
-  on("figures", "change", ({ target }) => update(change.viewed(state, { figure: target.value })));
-  on("mechanisms", "change", ({ target }) => {
-    const { key, on: full } = /** @type {any} */ (state.start.mechanisms.find((one) => one.key === target.value));
-    update(change.moved(state, { [key]: target.checked ? full : 0 }));
-  });
-  on("point", "change", () => {
-    const point = state.start.points[Number($("point").value)];
-    update($("point").value === "" || !point ? { ...state } : change.moved(state, point));
   });
 }
 
@@ -243,8 +261,7 @@ on("reset", "click", () => turn(change.reset));
 addEventListener("keydown", (event) => {
   const { key, target } = event;
   const field = /** @type {any} */ (target);
-  const isTyping = field?.type === "text" && field.value !== field.dataset.shown;
-  if (!(event.ctrlKey || event.metaKey) || isTyping) return;
+  if (!(event.ctrlKey || event.metaKey) || (field?.type === "text" && isTyped(field))) return;
   const isRedo = key === "y" || (key.toLowerCase() === "z" && event.shiftKey);
   if (!isRedo && key !== "z") return;
   event.preventDefault();
@@ -258,7 +275,6 @@ on("plot", "click", ({ target }) => {
   const point = state.answers.shown?.answer.plays?.[target.dataset.name];
   if (point) update(change.begun(state, point));
 });
-on("at", "input", () => update({ ...state, reading: Number($("at").value) }));
 on("numbers", "toggle", () => update({ ...state }));
 on("play", "click", () => {
   const { motion, start } = state;
@@ -272,11 +288,7 @@ on("step", "click", () => {
   const paused = change.withMotion(state, { paused: true, time: ended ? 0 : motion.time });
   update(change.played(paused, start.duration / 20 / motion.rate));
 });
-on("rate", "change", () => update(change.withMotion(state, { rate: Number($("rate").value) })));
-on("view", "submit", (event) => event.preventDefault());
-dark.addEventListener("change", () => state && draw());
-narrow.addEventListener("change", () => state && draw());
-addEventListener("resize", () => state && draw());
+dark.addEventListener("change", measure);
 
 // Jobs: the scenario's own models, and fits
 
@@ -314,7 +326,7 @@ on("stop", "click", () => stopper?.abort());
 function compare(task) {
   const ticked = /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("#free input:checked"));
   const free = [...ticked].map(({ value }) => value);
-  $("unfit").textContent = free.length ? "" : "tick the numbers to fit";
+  put("unfit", {}, free.length ? "" : "tick the numbers to fit");
   if (free.length) job({ task, values: state.values, data: state.table, free });
 }
 on("data", "submit", (event) => {
@@ -329,12 +341,9 @@ on("use", "click", () => update(change.withFit(state)));
 async function load(file) {
   try {
     const { data } = await ask("data", { name: file.name, text: await file.text() });
-    delete $("judged").dataset.fault;
     update(change.tabled(state, data));
   } catch (fault) {
-    $("judged").hidden = false;
-    $("judged").dataset.fault = "1";
-    $("judged").textContent = /** @type {Error} */ (fault).message;
+    update({ ...state, unread: /** @type {Error} */ (fault).message });
   }
 }
 on("file", "change", () => $("file").files[0] && load($("file").files[0]));
@@ -378,7 +387,7 @@ on("save", "click", async ({ target }) => {
   try {
     if (kind === "difference") {
       const { difference } = await ask(kind, { values: state.values });
-      $("change").querySelector("pre").textContent = difference;
+      put("difference", {}, difference);
       return $("change").showModal();
     }
     const isText = kind === "toml" || kind === "csv";
@@ -393,9 +402,7 @@ on("save", "click", async ({ target }) => {
     complain(fault);
   }
 });
-on("cancel", "click", () => $("change").close());
 on("write", "click", async () => {
-  $("change").close();
   try {
     await ask("write", { values: state.values, text: state.start.stamp });
     await follow();
@@ -417,7 +424,7 @@ on("copy", "click", async ({ target }) => {
     const text = texts[/** @type {"link"} */ (what)];
     if (!text) throw new Error("Run the scenario's own models first, at one point of the sweep");
     await navigator.clipboard.writeText(text);
-    $("copied").textContent = "copied";
+    put("copied", {}, "copied");
     $("copy").open = false;
   } catch (fault) {
     complain(fault);
@@ -440,20 +447,24 @@ async function begin() {
   const first = { ...change.initial(start), ...(kept && { table: kept.table }) };
   // of another text of the file only the table stays
   if (kept?.stamp === start.stamp) Object.assign(first, kept.state);
-  build(first);
+  $("members").value = Math.max(2, start.members);
+  $("main").hidden = false;
+  measure();
+  const sizes = new ResizeObserver(measure);
+  for (const id of ["plot", "words"]) sizes.observe($(id));
   listen();
   const paused = change.withMotion(first, { paused: quiet.matches });
   update(change.linked(paused, hash()));
-  rates(state, 0);
   if (start.stamp) setInterval(follow, 1000);
 }
 
 /** Show the scenario's file as it is saved. */
 async function follow() {
   if (document.hidden || asked.has("file")) return;
-  asked.add("file");
+  const reply = ask("file", {});
+  asked.set("file", reply);
   try {
-    if ((await ask("file", {})).stamp !== state.start.stamp) return location.reload();
+    if ((await reply).stamp !== state.start.stamp) return location.reload();
   } catch (fault) {
     if (!state.trouble) complain(fault);
   }

@@ -1,7 +1,8 @@
-// Figures as SVG: axes, lines, bands, points and labels. A figure is first a tree of plain objects, so that it can be
-// drawn, saved and tested alike.
+// Figures as SVG: axes, lines, bands, points and labels.
 
-/** @typedef {{ tag: string, attributes: Record<string, string | number>, children: (Node | string)[] }} Node */
+import { h } from "./node.js";
+
+/** @typedef {import("./node.js").Node} Node */
 /** @typedef {{ label: string, low: number, high: number, log: boolean }} Axis */
 /** @typedef {(number | null)[]} Numbers */
 /** What a panel shows: `line`, `band` (between `y` and `high`), `points` (with errors), `rule` (at the places `x`), and
@@ -14,34 +15,17 @@
 const FONT = "system-ui, sans-serif";
 const [LEFT, TOP, BOTTOM, GAP, LINE] = [70, 8, 40, 12, 14];
 
-/** Return an element of a figure.
- * @param {string} tag
- * @param {Record<string, string | number>} attributes
- * @param {(Node | string)[]} children
- * @returns {Node} */
-export const h = (tag, attributes = {}, ...children) => ({ tag, attributes, children });
+/** Return a line of a figure.
+ * @param {string} d
+ * @param {Node["attributes"]} look */
+export const path = (d, look) => h("path", { d, fill: "none", ...look });
 
-/** Return a figure as an element of the page.
- * @param {Node | string} node
- * @returns {globalThis.Node} */
-export function built(node) {
-  if (typeof node === "string") return document.createTextNode(node);
-  const result = document.createElementNS("http://www.w3.org/2000/svg", node.tag);
-  for (const [name, value] of Object.entries(node.attributes)) result.setAttribute(name, String(value));
-  result.append(...node.children.map(built));
-  return result;
-}
-
-/** Return a figure as the text of a file.
- * @param {Node | string} node
- * @returns {string} */
-export function written(node) {
-  const plain = (/** @type {string} */ text) =>
-    text.replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll('"', "&quot;");
-  if (typeof node === "string") return plain(node);
-  const words = Object.entries(node.attributes).map(([name, value]) => ` ${name}="${plain(String(value))}"`);
-  return `<${node.tag}${words.join("")}>${node.children.map(written).join("")}</${node.tag}>`;
-}
+/** Return a text of a figure.
+ * @param {string} words
+ * @param {number} x
+ * @param {number} y
+ * @param {Node["attributes"]} look */
+export const label = (words, x, y, look = {}) => h("text", { x: x.toFixed(1), y: y.toFixed(1), ...look }, words);
 
 /** @param {Numbers} values
  * @returns {number[]} */
@@ -138,12 +122,10 @@ export function strokes(x, y, right, up) {
   /** @type {[number, number][]} */
   let column = [];
   const leave = () => {
-    if (column.length <= 4 || x.length < 1000) run.push(...column);
-    else {
-      const order = column.map(([, height], place) => [height, place]).sort((one, other) => one[0] - other[0]);
-      const places = new Set([0, order[0][1], order[order.length - 1][1], column.length - 1]);
-      run.push(...[...places].sort((one, other) => one - other).map((place) => column[place]));
-    }
+    const heights = column.map(([, height]) => height);
+    const few = [0, heights.indexOf(Math.min(...heights)), heights.indexOf(Math.max(...heights)), heights.length - 1];
+    const places = [...new Set(x.length < 1000 ? heights.keys() : few)].sort((one, other) => one - other);
+    run.push(...places.filter((place) => place in column).map((place) => column[place]));
     column = [];
   };
   for (let place = 0; place < x.length; place += 1) {
@@ -167,96 +149,48 @@ export function strokes(x, y, right, up) {
 /** @param {[number, number][]} points */
 const joined = (points) => points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L");
 
-/** @param {Mark} mark
+/** Return what is drawn of a mark.
+ * @param {Mark} mark
  * @param {(value: number) => number} right
  * @param {(value: number) => number} up
- * @param {[number, number]} ends
+ * @param {number[]} ends
  * @returns {Node[]} */
-function shapes(mark, right, up, ends) {
-  const { x, y, colour, width = 2, dash = "", opacity = 1 } = mark;
-  /** @type {Record<string, string>} */
-  const about = mark.name ? { "data-name": mark.name } : {};
-  const said = mark.title ? [h("title", {}, mark.title)] : [];
-  if (mark.kind === "image") {
-    const [left, end] = known(x).map(right);
-    const [bottom, top] = known(y).map(up);
-    return [
-      h("image", {
-        x: left,
-        y: top,
-        width: end - left,
-        height: bottom - top,
-        href: mark.name ?? "",
-        preserveAspectRatio: "none",
-      }),
-    ];
+function shapes(mark, right, up, [top, bottom]) {
+  const { kind, x, y, high, colour, width = 2, dash = "", opacity = 1, name = "" } = mark;
+  const look = { "data-name": name, stroke: colour, "stroke-width": width };
+  if (kind === "image") {
+    const [[left, end], [low, upper]] = [known(x).map(right), known(y).map(up)];
+    const size = { x: left, y: upper, width: end - left, height: low - upper };
+    return [h("image", { ...size, href: name, preserveAspectRatio: "none" })];
   }
-  if (mark.kind === "rule") {
-    const path = known(x).map((at) => `M${right(at).toFixed(1)} ${ends[0]}V${ends[1]}`);
-    return path.length
-      ? [
-          h("path", {
-            ...about,
-            d: path.join(""),
-            stroke: colour,
-            "stroke-width": width,
-            "stroke-dasharray": dash || "6 4",
-            fill: "none",
-          }),
-        ]
-      : [];
+  if (kind === "rule") {
+    const lines = known(x).map((at) => `M${right(at).toFixed(1)} ${top}V${bottom}`);
+    return lines.length ? [path(lines.join(""), { ...look, "stroke-dasharray": dash || "6 4" })] : [];
   }
-  if (mark.kind === "band") {
-    const [low, high] = [strokes(x, y, right, up), strokes(x, mark.high ?? y, right, up)];
-    return low.map((points, k) =>
-      h(
-        "path",
-        {
-          ...about,
-          d: `M${joined(points)}L${joined([...(high[k] ?? points)].reverse())}Z`,
-          fill: colour,
-          "fill-opacity": opacity,
-          stroke: "none",
-        },
-        ...said,
-      ),
-    );
+  if (kind === "band") {
+    const [low, upper] = [strokes(x, y, right, up), strokes(x, high ?? y, right, up)];
+    const area = { "data-name": name, fill: colour, "fill-opacity": opacity };
+    return low.map((points, k) => ({
+      ...path(`M${joined(points)}L${joined([...(upper[k] ?? points)].reverse())}Z`, area),
+      children: mark.title ? [h("title", {}, mark.title)] : [],
+    }));
   }
-  if (mark.kind === "line") {
-    const path = strokes(x, y, right, up).map((points) => `M${joined(points)}${points.length === 1 ? "h.1" : ""}`);
-    const look = { stroke: colour, "stroke-width": width, "stroke-dasharray": dash, "stroke-opacity": opacity };
-    return path.length
-      ? [
-          h("path", {
-            ...about,
-            d: path.join(""),
-            fill: "none",
-            "stroke-linejoin": "round",
-            "stroke-linecap": "round",
-            ...look,
-          }),
-        ]
-      : [];
+  if (kind === "line") {
+    const lines = strokes(x, y, right, up).map((points) => `M${joined(points)}${points.length === 1 ? "h.1" : ""}`);
+    const ends = { "stroke-linejoin": "round", "stroke-linecap": "round" };
+    const strength = { "stroke-dasharray": dash, "stroke-opacity": opacity };
+    return lines.length ? [path(lines.join(""), { ...look, ...ends, ...strength })] : [];
   }
   return x.flatMap((at, k) => {
     const value = y[k];
     if (at === null || value === null || !Number.isFinite(right(at))) return [];
-    const [across, along] = [right(at), up(value)];
-    const error = mark.high?.[k] ?? 0;
-    const bar = h("path", {
-      d: `M${across.toFixed(1)} ${up(value - error).toFixed(1)}V${up(value + error).toFixed(1)}`,
-      stroke: colour,
-    });
-    const dot = h("circle", {
-      ...about,
-      cx: across.toFixed(1),
-      cy: along.toFixed(1),
-      r: mark.size ?? 3.5,
-      fill: "none",
-      stroke: colour,
-      "stroke-width": width,
-    });
-    return error ? [bar, dot] : [dot];
+    const [across, along, error] = [right(at).toFixed(1), up(value).toFixed(1), high?.[k] ?? 0];
+    const dot = h("circle", { ...look, cx: across, cy: along, r: mark.size ?? 3.5, fill: "none" });
+    if (!error) return [dot];
+    return [
+      path(`M${across} ${up(value - error).toFixed(1)}V${up(value + error).toFixed(1)}`, { stroke: colour }),
+      dot,
+    ];
   });
 }
 
@@ -294,134 +228,99 @@ function endings(marks, theme, up) {
     .sort((one, other) => one.at - other.at);
 }
 
-/** Return the width that labels need.
- * @param {Panel[]} panels
- * @param {number} width */
-export function rightOf(panels, width) {
-  const longest = Math.max(0, ...panels.flatMap(({ marks }) => marks.map(({ label }) => label?.length ?? 0)));
-  return Math.min(width * 0.4, longest ? 6.9 * longest + 28 : 14);
-}
-
-/** Return a figure of panels above each other.
- * @param {Panel[]} panels
- * @param {{ width: number, theme: Theme, title: string, description: string, shared?: boolean }} about
- * @returns {Node} */
-export function figure(panels, { width, theme, title, description, shared = true }) {
-  const ends = [LEFT, width - rightOf(panels, width)];
-  const parts = [];
-  let top = TOP;
-  for (const [number, panel] of panels.entries()) {
-    const isLast = number === panels.length - 1;
-    parts.push(...panelOf(panel, { ends, top, theme, number, hasLabels: isLast || !shared }));
-    top += panel.height + (isLast ? 0 : shared ? GAP : GAP + BOTTOM);
-  }
-  const height = top + BOTTOM;
-  const text = [h("title", { id: "figure-title" }, title), h("desc", { id: "figure-words" }, description)];
-  const back = h("rect", { width, height, fill: theme.back });
-  const look = { "font-family": FONT, "font-size": 12, fill: theme.ink };
-  const size = { viewBox: `0 0 ${width} ${height}`, width, height };
-  return h(
-    "svg",
-    {
-      xmlns: "http://www.w3.org/2000/svg",
-      ...size,
-      role: "img",
-      "aria-labelledby": "figure-title figure-words",
-      ...look,
-    },
-    ...text,
-    back,
-    ...parts,
-  );
-}
-
-/** Return the places in a figure of the panels' ends: left, right, and top and bottom of each.
+/** Return the places in a figure of the panels' ends: left, right, and top and bottom of each; and the figure's height.
  * @param {Panel[]} panels
  * @param {number} width
  * @param {boolean} shared */
 export function frames(panels, width, shared = true) {
+  const longest = Math.max(0, ...panels.flatMap(({ marks }) => marks.map(({ label }) => label?.length ?? 0)));
+  const right = width - Math.min(width * 0.4, longest ? 6.9 * longest + 28 : 14);
   let top = TOP;
   const rows = panels.map(({ height }) => {
     const row = [top, top + height];
     top += height + (shared ? GAP : GAP + BOTTOM);
     return row;
   });
-  return { left: LEFT, right: width - rightOf(panels, width), rows };
+  const height = (rows.at(-1)?.[1] ?? TOP) + BOTTOM;
+  return { left: LEFT, right, rows, height };
+}
+
+/** Return a figure of panels above each other. Names of its parts begin with `id`, one for each figure of a page.
+ * @param {Panel[]} panels
+ * @param {{ width: number, theme: Theme, title: string, description: string, shared?: boolean, id?: string }} about
+ * @returns {Node} */
+export function figure(panels, { width, theme, title, description, shared = true, id = "figure" }) {
+  const { left, right, rows, height } = frames(panels, width, shared);
+  const parts = panels.flatMap((panel, k) => {
+    const hasLabels = !shared || k === panels.length - 1;
+    return panelOf(panel, { ends: [left, right], row: rows[k], theme, clip: `${id}-panel-${k}`, hasLabels });
+  });
+  const about = { role: "img", "aria-labelledby": `${id}-title ${id}-words` };
+  const size = { viewBox: `0 0 ${width} ${height}`, width, height };
+  return h(
+    "svg",
+    { xmlns: "http://www.w3.org/2000/svg", ...size, ...about, "font-family": FONT, "font-size": 12, fill: theme.ink },
+    h("title", { id: `${id}-title` }, title),
+    h("desc", { id: `${id}-words` }, description),
+    h("rect", { width, height, fill: theme.back }),
+    ...parts,
+  );
 }
 
 /** @param {Panel} panel
- * @param {{ ends: number[], top: number, theme: Theme, number: number, hasLabels: boolean }} about
+ * @param {{ ends: number[], row: number[], theme: Theme, clip: string, hasLabels: boolean }} about
  * @returns {Node[]} */
-function panelOf({ x, y, height, marks }, { ends, top, theme, number, hasLabels }) {
-  const [left, right] = ends;
-  const bottom = top + height;
+function panelOf({ x, y, marks }, { ends: [left, right], row: [top, bottom], theme, clip, hasLabels }) {
   const [across, along] = [placed(x, left, right), placed(y, bottom, top)];
   // an axis without a label is none
-  const rows = y.label ? ticks(y, Math.max(2, height / 36)) : { large: [], small: [] };
+  const rows = y.label ? ticks(y, Math.max(2, (bottom - top) / 36)) : { large: [], small: [] };
   const columns = ticks(x, Math.max(2, (right - left) / 90));
+  const at = (/** @type {number} */ value) => across(value).toFixed(1);
+  const up = (/** @type {number} */ value) => along(value).toFixed(1);
   const grid = [
-    ...columns.large.map((value) => `M${across(value).toFixed(1)} ${top}V${bottom}`),
-    ...rows.large.map((value) => `M${left} ${along(value).toFixed(1)}H${right}`),
+    ...columns.large.map((value) => `M${at(value)} ${top}V${bottom}`),
+    ...rows.large.map((value) => `M${left} ${up(value)}H${right}`),
   ];
   // ticks point inwards on all four sides, as in the figures of sim plot
-  const inward = (
-    /** @type {number[]} */ values,
-    /** @type {(value: number) => number} */ at,
-    /** @type {number} */ size,
-  ) =>
-    values.map((value) =>
-      at === across
-        ? `M${at(value).toFixed(1)} ${bottom}v${-size}M${at(value).toFixed(1)} ${top}v${size}`
-        : `M${left} ${at(value).toFixed(1)}h${size}M${right} ${at(value).toFixed(1)}h${-size}`,
-    );
-  const marked = [
-    ...inward(columns.large, across, 5),
-    ...inward(columns.small, across, 3),
-    ...inward(rows.large, along, 5),
-    ...inward(rows.small, along, 3),
-  ];
-  const clip = `panel-${number}`;
-  const labels = endings(marks, theme, along);
-  const places = spread(labels, top + 6, bottom - 2);
-  const middle = (top + bottom) / 2;
+  const inward = [
+    { ...columns, rows: rows.large, size: 5 },
+    { large: columns.small, rows: rows.small, size: 3 },
+  ].flatMap(({ large, rows: heights, size }) => [
+    ...large.map((value) => `M${at(value)} ${bottom}v${-size}M${at(value)} ${top}v${size}`),
+    ...heights.map((value) => `M${left} ${up(value)}h${size}M${right} ${up(value)}h${-size}`),
+  ]);
+  const size = { x: left, y: top, width: right - left, height: bottom - top };
+  const frame = { stroke: theme.ink, "stroke-width": 0.8 };
+  const [middle, names] = [{ "text-anchor": "middle" }, endings(marks, theme, along)];
+  const places = spread(names, top + 6, bottom - 2);
   return [
-    h("clipPath", { id: clip }, h("rect", { x: left, y: top, width: right - left, height })),
-    h("path", { d: grid.join(""), stroke: theme.grid, fill: "none" }),
+    h("clipPath", { id: clip }, h("rect", size)),
+    path(grid.join(""), { stroke: theme.grid }),
     h(
       "g",
       { "clip-path": `url(#${clip})`, class: "marks" },
       ...marks.flatMap((mark) => shapes(mark, across, along, [top, bottom])),
     ),
-    h("path", { d: marked.join(""), stroke: theme.ink, fill: "none", "stroke-width": 0.8 }),
-    h("rect", { x: left, y: top, width: right - left, height, fill: "none", stroke: theme.ink, "stroke-width": 0.8 }),
-    ...rows.large.map((value) =>
-      h("text", { x: left - 6, y: (along(value) + 4).toFixed(1), "text-anchor": "end" }, ticked(value)),
-    ),
-    ...(hasLabels
-      ? columns.large.map((value) =>
-          h("text", { x: across(value).toFixed(1), y: bottom + 16, "text-anchor": "middle" }, ticked(value)),
-        )
-      : []),
-    ...(hasLabels
-      ? [h("text", { x: (left + right) / 2, y: bottom + 33, "text-anchor": "middle", class: "xtitle" }, x.label)]
-      : []),
-    h("text", { transform: `translate(15 ${middle}) rotate(-90)`, "text-anchor": "middle", class: "ytitle" }, y.label),
-    ...labels.flatMap(({ text, colour, at }, k) => [
-      h("path", {
-        d: `M${right} ${at.toFixed(1)}L${right + 8} ${places[k].toFixed(1)}h8`,
-        stroke: colour,
-        "stroke-width": 2,
-        fill: "none",
+    path(inward.join(""), frame),
+    h("rect", { ...size, fill: "none", ...frame }),
+    h(
+      "g",
+      {},
+      ...rows.large.map((value) => label(ticked(value), left - 6, along(value) + 4, { "text-anchor": "end" })),
+      ...(hasLabels ? columns.large.map((value) => label(ticked(value), across(value), bottom + 16, middle)) : []),
+      ...(hasLabels ? [label(x.label, (left + right) / 2, bottom + 33, { ...middle, class: "xtitle" })] : []),
+      label(y.label, 0, 0, {
+        ...middle,
+        transform: `translate(15 ${(top + bottom) / 2}) rotate(-90)`,
+        class: "ytitle",
       }),
-      h("text", { x: right + 20, y: (places[k] + 4).toFixed(1) }, text),
-    ]),
+      ...names.flatMap(({ text, colour, at: from }, k) => [
+        path(`M${right} ${from.toFixed(1)}L${right + 8} ${places[k].toFixed(1)}h8`, {
+          stroke: colour,
+          "stroke-width": 2,
+        }),
+        label(text, right + 20, places[k] + 4),
+      ]),
+    ),
   ];
-}
-
-/** Return the colour of a share from −1 (blue) over 0 (white) to 1 (red).
- * @param {number} share
- * @returns {[number, number, number]} */
-export function diverging(share) {
-  const [dark, size] = [share < 0 ? [33, 102, 172] : [178, 24, 43], Math.min(1, Math.abs(share))];
-  return /** @type {[number, number, number]} */ (dark.map((part) => Math.round(255 + (part - 255) * size)));
 }

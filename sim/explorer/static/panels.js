@@ -17,6 +17,7 @@ export const COLOURS = {
   stress: "#8b6bb1",
   rest: "#8a8a8a",
   own: "#009E73",
+  black: "#1a1a1a",
 };
 
 /** @param {Numbers} values
@@ -56,16 +57,35 @@ export function describedOf(state) {
 function ofServer(state, theme) {
   const { panels: found = [], plays } = describedOf(state)?.answer ?? {};
   const more = isFitted(state) ? (state.fit?.answer.marks ?? []) : [];
-  return found.map((/** @type {any} */ { of, x, y, height, marks }) => {
-    const own = more.filter((/** @type {any} */ mark) => of && mark.of === of);
-    const drawn = [...own, ...marks].map((/** @type {any} */ mark) => ({
+  const each = found.map((/** @type {any} */ panel) => {
+    const own = more.filter((/** @type {any} */ { of }) => of && of === panel.of);
+    const marks = [...own, ...panel.marks];
+    return { ...panel, marks: marks.map((mark) => ({ ...mark, title: plays?.[mark.name]?.words })) };
+  });
+  return described(each, theme);
+}
+
+/** Return an axis that the server describes. It may know the ends.
+ * @param {any} about
+ * @param {Numbers[]} each */
+function axis({ label, low, high, ...choices }, each) {
+  const result = axisOf(greek(label), each, choices);
+  return low === undefined ? result : { ...result, low, high };
+}
+
+/** Return panels that the server describes.
+ * @param {any[]} each
+ * @param {Theme} theme
+ * @returns {Panel[]} */
+export function described(each, theme) {
+  return each.map(({ x, y, height, marks }) => {
+    const drawn = marks.map((/** @type {any} */ mark) => ({
       ...mark,
-      title: plays?.[mark.name]?.words,
       label: greek(mark.label ?? ""),
       colour: /** @type {any} */ (COLOURS)[mark.colour] ?? theme.ink,
     }));
     const across = drawn.map((/** @type {Mark} */ mark) => mark.x);
-    return { x: axisOf(greek(x.label), across, x), y: axisOf(y.label, drawn.flatMap(extent), y), height, marks: drawn };
+    return { x: axis(x, across), y: axis(y, drawn.flatMap(extent)), height, marks: drawn };
   });
 }
 
@@ -74,9 +94,8 @@ function ofServer(state, theme) {
  * @param {State} state */
 export function curvesOf(state) {
   const found = state.answers.curves;
-  if (!found || found.answer.faults) return null;
   const figure = state.view.figure === "sweep" ? "sweep" : "speed";
-  return found.of.figure === figure ? found.answer : null;
+  return found && !found.answer.faults && found.of.figure === figure ? found.answer : null;
 }
 
 /** @param {State} state
@@ -86,10 +105,11 @@ export function curvesOf(state) {
 function ofCurves(state, theme, narrow) {
   const shown = curvesOf(state);
   if (!shown) return [];
+  const { pin, answers, view } = state;
   const { curves, units, axis, level, data } = shown;
   const [perX, unitX] = axis.unit;
   const x = times(shown.x, perX);
-  const sized = state.view.absolute ? "contact_area" : "area_ratio";
+  const sized = view.absolute ? "contact_area" : "area_ratio";
   const unitOf = (/** @type {string} */ name) => units[name] ?? [100, "%"];
   /** @type {(name: string, more?: Partial<Mark> & { from?: any }) => Mark} */
   const line = (name, { from = shown, ...more } = {}) => ({
@@ -99,97 +119,71 @@ function ofCurves(state, theme, narrow) {
     colour: theme.ink,
     ...more,
   });
-  const { pin } = state;
-  const figure = state.answers.curves.of.figure;
-  const isPinned = pin?.of.figure === figure;
-  const before = isPinned ? pin?.answer : isCurrent(state, "before") ? state.answers.before.answer : null;
+  const isPinned = pin?.of.figure === answers.curves.of.figure;
+  const before = isPinned ? pin?.answer : isCurrent(state, "before") ? answers.before.answer : null;
   const name = isPinned ? "pinned" : "as it came";
-  const dotted = { from: before, colour: COLOURS.rest, dash: "1 4", width: 2, name };
+  const dotted = { from: before, colour: COLOURS.rest, dash: "1 4", name };
   const hasChanged = before && !same(before.values, shown.values);
+  const others = current(state, "others")?.others ?? [];
   /** @type {(name: string) => Mark[]} */
   const beside = (quantity) => [
     ...(hasChanged ? [line(quantity, { ...dotted, label: quantity === sized ? name : "" })] : []),
-    ...(current(state, "others")?.others ?? []).map((/** @type {any} */ other) =>
-      line(quantity, {
-        from: { x: state.answers.others.answer.x, ...other },
-        colour: COLOURS.rest,
-        width: 1.2,
-        label: greek(other.label),
-      }),
-    ),
+    ...others.map((/** @type {any} */ other) => {
+      const from = { x: answers.others.answer.x, ...other };
+      return line(quantity, { from, colour: COLOURS.rest, width: 1.2, label: greek(other.label) });
+    }),
     ...ofRun(state, quantity, unitOf(quantity)[0], axis),
     ...ofData(data, quantity, unitOf(quantity)[0], perX, theme),
   ];
-  const areas = stacked(state, shown, theme, line);
-  const [, unit] = unitOf(sized);
-  const marks = {
-    area: [...areas, ...beside(sized), rule(level, perX)],
-    energy: [
-      line("fluctuation_energy", { colour: COLOURS.fluctuations, label: "ΔΓ" }),
-      line("work_of_adhesion", { label: "w" }),
-      rule(level, perX),
-    ],
-    friction: [line("friction_force", { label: "F" }), ...beside("friction_force"), rule(level, perX)],
-  };
-  const letter = lettered(axis.symbol).join("");
-  const across = axisOf(`${axis.name} ${letter} ${unitX ? `(${unitX})` : ""}`, [x], { log: axis.log, tight: true });
-  /** @type {(label: string, marks: Mark[], height: number) => Panel} */
-  const panel = (label, drawn, height) => ({
-    x: across,
-    y: axisOf(label, drawn.filter(({ kind }) => kind !== "rule").flatMap(extent), { zero: true }),
-    height,
-    marks: drawn,
+  const across = axisOf(`${axis.name} ${lettered(axis.symbol).join("")} ${unitX ? `(${unitX})` : ""}`, [x], {
+    log: axis.log,
+    tight: true,
   });
-  const size = state.view.absolute ? `area A (${unit})` : "area (% of JKR's)";
-  const first = panel(size, marks.area, narrow ? 230 : 300);
-  if (narrow) return [first];
-  const energy = panel(`energy (${unitOf("work_of_adhesion")[1]})`, marks.energy, 110);
-  const friction = panel(`friction (${unitOf("friction_force")[1]})`, marks.friction, 130);
+  /** @type {(label: string, marks: Mark[], height: number) => Panel} */
+  const panel = (label, marks, height) => ({
+    x: across,
+    y: axisOf(label, marks.flatMap(extent), { zero: true }),
+    height,
+    marks: [...marks, rule(times(level.places, perX))],
+  });
+  const size = view.absolute ? `area A (${unitOf(sized)[1]})` : "area (% of JKR's)";
+  const area = panel(size, [...stacked(state, shown, line), ...beside(sized)], narrow ? 230 : 300);
+  if (narrow) return [area];
+  const energies = [
+    line("fluctuation_energy", { colour: COLOURS.fluctuations, label: "ΔΓ" }),
+    line("work_of_adhesion", { label: "w" }),
+  ];
+  const energy = panel(`energy (${unitOf("work_of_adhesion")[1]})`, energies, 110);
+  const forces = [line("friction_force", { label: "F" }), ...beside("friction_force")];
+  const friction = panel(`friction (${unitOf("friction_force")[1]})`, forces, 130);
   // a scene without any friction has no panel of it
-  return largest(curves.friction_force) ? [first, energy, friction] : [first, energy];
+  return largest(curves.friction_force) ? [area, energy, friction] : [area, energy];
 }
 
 /** Return the numbers that an axis has to hold.
  * @param {Mark} mark
  * @returns {Numbers[]} */
 function extent({ kind, y, high }) {
-  if (kind !== "points" || !high) return high ? [y, high] : [y];
-  return [
-    plus(
-      y,
-      high.map((error) => error ?? 0),
-    ),
-    plus(
-      y,
-      high.map((error) => -(error ?? 0)),
-    ),
-  ];
+  if (!high) return [y];
+  if (kind !== "points") return [y, high];
+  const errors = high.map((error) => error ?? 0);
+  return [plus(y, errors), plus(y, times(errors, -1))];
 }
 
-/** @param {any} level
- * @param {number} factor
+/** Return a thin line across a panel at each of some places.
+ * @param {Numbers} x
+ * @param {Partial<Mark>} more
  * @returns {Mark} */
-const rule = (level, factor) => ({
-  kind: "rule",
-  x: times(level.places, factor),
-  y: [],
-  colour: COLOURS.rest,
-  width: 1,
-});
+const rule = (x, more = {}) => ({ kind: "rule", x, y: [], colour: COLOURS.rest, width: 1, ...more });
 
 /** Return the area that is left, and above it what each mechanism takes.
  * @param {State} state
  * @param {any} shown
- * @param {Theme} theme
  * @param {(name: string, more?: any) => Mark} line
  * @returns {Mark[]} */
-function stacked(state, shown, theme, line) {
-  const { curves } = shown;
-  const sized = state.view.absolute ? "contact_area" : "area_ratio";
-  const left = line(sized, { width: 2.5, label: "area", name: "area" });
-  const whole = left.y.map((value, k) =>
-    value !== null && curves.area_ratio[k] ? value / curves.area_ratio[k] : null,
-  );
+function stacked(state, { curves }, line) {
+  const left = line(state.view.absolute ? "contact_area" : "area_ratio", { width: 2.5, label: "area", name: "area" });
+  const whole = left.y.map((value, k) => (curves.area_ratio[k] ? (value ?? 0) / curves.area_ratio[k] : null));
   const swap = state.view.first && curves.lost_to_bonds_last;
   const bonds = [swap ? "lost_to_bonds_last" : "lost_to_bonds", "lost to bonds", COLOURS.bonds];
   const waves = [
@@ -197,23 +191,18 @@ function stacked(state, shown, theme, line) {
     "lost to fluctuations",
     COLOURS.fluctuations,
   ];
-  const order = [
-    ["lost_to_mean_stress", "lost to mean stress", COLOURS.stress],
-    ...(swap ? [bonds, waves] : [waves, bonds]),
-  ];
+  const stress = ["lost_to_mean_stress", "lost to mean stress", COLOURS.stress];
   /** @type {Mark[]} */
   const result = [];
   let level = left.y;
-  for (const [name, label, colour] of order.filter(([key]) => curves[key])) {
-    const share = /** @type {Numbers} */ (curves[name]);
-    const taken = share.map((value, k) => {
-      const full = whole[k];
-      return value === null || full === null ? null : value * full;
-    });
+  for (const [name, label, colour] of swap ? [stress, bonds, waves] : [stress, waves, bonds]) {
+    const share = /** @type {Numbers | undefined} */ (curves[name]);
+    if (!share) continue;
+    const taken = share.map((value, k) => (value === null || whole[k] === null ? null : value * whole[k]));
     const high = plus(level, taken);
     // a mechanism that takes nothing has no label
-    const most = Math.max(...share.map((value) => Math.abs(value ?? 0)));
-    if (most > 1e-4) result.push({ kind: "band", x: left.x, y: level, high, colour, opacity: 0.35, label, name });
+    if (largest(share) > 1e-4)
+      result.push({ kind: "band", x: left.x, y: level, high, colour, opacity: 0.35, label, name });
     level = high;
   }
   return [...result, left];
@@ -227,53 +216,33 @@ function stacked(state, shown, theme, line) {
  * @returns {Mark[]} */
 function ofRun(state, name, factor, axis) {
   if (state.view.figure !== "speed") return [];
-  const isStale = state.run && differences(state, state.run.of.values) !== "";
+  const { run } = state;
+  const isStale = run !== null && differences(state, run.of.values) !== "";
   const band = current(state, "band");
   const runs = [
-    ...(state.run && !isStale ? [] : band ? [[band, nameOf(band.members)]] : []),
-    ...(state.run ? [[state.run.answer, nameOfRun(state)]] : []),
+    ...(band && (!run || isStale) ? [{ found: band, label: nameOf(band.members), isThin: false }] : []),
+    ...(run ? [{ found: run.answer, label: nameOfRun(state), isThin: isStale }] : []),
   ];
   return runs
-    .filter(([run]) => run.along === "speed")
-    .flatMap(([run, label]) => {
-      const { mean, low, high } = run.curves[name];
-      const x = times(run.speed, axis.unit[0]);
-      const middle = times(mean, factor);
-      const isThin = Boolean(isStale) && run === state.run?.answer;
-      const look = { x, y: middle, colour: COLOURS.own, label: name === "friction_force" ? "" : label };
+    .filter(({ found }) => found.along === "speed")
+    .flatMap(({ found, label, isThin }) => {
+      const { mean, low, high } = found.curves[name];
+      const [x, y, end] = [times(found.speed, axis.unit[0]), times(mean, factor), times(high, factor)];
+      const own = { x, y, colour: COLOURS.own, name: isThin ? "ran" : "own" };
+      const named = { ...own, label: name === "friction_force" ? "" : label };
       if (x.length < 3) {
-        return [
-          /** @type {Mark} */ ({
-            kind: "points",
-            ...look,
-            high: plus(times(high, factor), times(mean, -factor)),
-            width: isThin ? 1 : 2,
-            name: isThin ? "ran" : "own",
-          }),
-        ];
+        return [mark("points", { ...named, high: plus(end, times(y, -1)), width: isThin ? 1 : 2 })];
       }
-      const dashed = /** @type {Mark} */ ({
-        kind: "line",
-        ...look,
-        width: isThin ? 0.8 : 2,
-        dash: "6 4",
-        name: isThin ? "ran" : "own",
-      });
-      if (isThin) return [dashed];
-      return [
-        /** @type {Mark} */ ({
-          kind: "band",
-          x,
-          y: times(low, factor),
-          high: times(high, factor),
-          colour: COLOURS.own,
-          opacity: 0.2,
-          name: "interval",
-        }),
-        dashed,
-      ];
+      const line = mark("line", { ...named, width: isThin ? 0.8 : 2, dash: "6 4" });
+      const interval = mark("band", { ...own, y: times(low, factor), high: end, opacity: 0.2, name: "interval" });
+      return isThin ? [line] : [interval, line];
     });
 }
+
+/** @param {Mark["kind"]} kind
+ * @param {Omit<Mark, "kind">} more
+ * @returns {Mark} */
+const mark = (kind, more) => ({ kind, ...more });
 
 /** Return the marks of measured points.
  * @param {any} data
@@ -285,18 +254,9 @@ function ofRun(state, name, factor, axis) {
 function ofData(data, name, factor, perX, theme) {
   const points = data?.points[name];
   if (!points) return [];
-  return [
-    {
-      kind: "points",
-      x: times(points.x, perX),
-      y: times(points.values, factor),
-      high: times(points.errors, factor),
-      colour: theme.ink,
-      width: 1.5,
-      label: "measured",
-      name: "measured",
-    },
-  ];
+  const [y, high] = [times(points.values, factor), times(points.errors, factor)];
+  const look = { colour: theme.ink, width: 1.5, label: "measured", name: "measured" };
+  return [mark("points", { x: times(points.x, perX), y, high, ...look })];
 }
 
 /** Return what is drawn of a motion: two courses over time, or of a moving mount the load over its path and the area.
@@ -312,22 +272,22 @@ function ofMotion(state, theme, narrow) {
   const [perTime, unitTime] = scaled(end, "s");
   const t = times(columns.t, perTime);
   const time = axisOf(`time (${unitTime})`, [[0, end * perTime]], { tight: true });
-  const changes = /** @type {Mark} */ ({
-    kind: "rule",
-    x: pieces.slice(1).map(({ from }) => from * perTime),
-    y: [],
-    colour: COLOURS.own,
-    width: 1,
-    name: "changed",
-  });
+  const changed = { colour: COLOURS.own, name: "changed" };
+  const changes = rule(
+    pieces.slice(1).map(({ from }) => from * perTime),
+    changed,
+  );
   /** @type {(name: string, words: string, unit: string, zero: boolean, colour?: string) => Panel} */
   const over = (name, words, unit, zero, colour = theme.ink) => {
     const [factor, shown] = scaled(largest(columns[name]), unit);
-    const y = times(columns[name], factor);
-    const line = /** @type {Mark} */ ({ kind: "line", x: t, y, colour, width: 1.4, name });
-    const others = besides(state, ["t", perTime], [name, factor]);
-    const ends = [y, ...others.map((mark) => mark.y)];
-    return { x: time, y: axisOf(`${words} (${shown})`, ends, { zero }), height, marks: [...others, line, changes] };
+    const line = mark("line", { x: t, y: times(columns[name], factor), colour, width: 1.4, name });
+    const marks = [...besides(state, ["t", perTime], [name, factor]), line];
+    const y = axisOf(
+      `${words} (${shown})`,
+      marks.map((one) => one.y),
+      { zero },
+    );
+    return { x: time, y, height, marks: [...marks, changes] };
   };
   if (columns.normal_load) return ofMount(state, theme, over);
   const area = over("contact_area", "area A", "m^2", false, COLOURS.bonds);
@@ -345,19 +305,21 @@ function ofMotion(state, theme, narrow) {
 function besides(state, [x, perX], [y, perY]) {
   return (current(state, "others")?.others ?? [])
     .filter((/** @type {any} */ { columns }) => columns?.[x] && columns[y])
-    .map((/** @type {any} */ { label, columns }) => ({
-      kind: "line",
-      x: times(columns[x], perX),
-      y: times(columns[y], perY),
-      colour: COLOURS.rest,
-      width: 1,
-      label: greek(label),
-      name: "other",
-    }));
+    .map((/** @type {any} */ { label, columns }) =>
+      mark("line", {
+        x: times(columns[x], perX),
+        y: times(columns[y], perY),
+        colour: COLOURS.rest,
+        width: 1,
+        label: greek(label),
+        name: "other",
+      }),
+    );
 }
 
-/** @param {Numbers} values */
-const largest = (values) =>
+/** Return the largest size of numbers.
+ * @param {Numbers} values */
+export const largest = (values) =>
   values.reduce((/** @type {number} */ most, value) => Math.max(most, Math.abs(value ?? 0)), 0);
 
 /** @param {State} state
@@ -369,26 +331,29 @@ function ofMount(state, theme, over) {
   const isLoad = state.start.mount === "load";
   const [across, along] = isLoad ? ["normal_load", "contact_radius"] : [state.start.mount, "normal_load"];
   const known = columns[across] ? across : "displacement";
-  const [perX, unitX] = scaled(largest(columns[known]), known === "normal_load" ? "N" : "m");
-  const [perY, unitY] = scaled(largest(columns[along]), along === "normal_load" ? "N" : "m");
-  const x = times(columns[known], perX);
-  const y = broken(times(columns[along], perY), isLoad);
-  const words = (/** @type {string} */ name, /** @type {string} */ unit) => `${name.replaceAll("_", " ")} (${unit})`;
-  const loop = /** @type {Mark} */ ({ kind: "line", x, y, colour: theme.ink, width: 1.6, name: "loop" });
-  const others = besides(state, [known, perX], [along, perY]).map((mark) => ({ ...mark, y: broken(mark.y, isLoad) }));
-  const [wide, high] = [
-    [x, ...others.map((mark) => mark.x)],
-    [y, ...others.map((mark) => mark.y)],
+  /** @type {(name: string) => [number, string]} */
+  const scale = (name) => {
+    const [factor, unit] = scaled(largest(columns[name]), name === "normal_load" ? "N" : "m");
+    return [factor, `${name.replaceAll("_", " ")} (${unit})`];
+  };
+  const [[perX, wordsX], [perY, wordsY]] = [scale(known), scale(along)];
+  const look = { colour: theme.ink, width: 1.6, name: "loop" };
+  const loop = mark("line", { x: times(columns[known], perX), y: times(columns[along], perY), ...look });
+  const marks = [...besides(state, [known, perX], [along, perY]), loop].map((one) => ({
+    ...one,
+    y: broken(one.y, isLoad),
+  }));
+  const [x, y] = [
+    axisOf(
+      wordsX,
+      marks.map((one) => one.x),
+    ),
+    axisOf(
+      wordsY,
+      marks.map((one) => one.y),
+    ),
   ];
-  return [
-    {
-      x: axisOf(words(known, unitX), wide),
-      y: axisOf(words(along, unitY), high),
-      height: 260,
-      marks: [...others, loop],
-    },
-    over("contact_area", "area A", "m^2", true),
-  ];
+  return [{ x, y, height: 260, marks }, over("contact_area", "area A", "m^2", true)];
 }
 
 /** Return radii without those at which a contact under a load has jumped open or closed, so that no line joins them.

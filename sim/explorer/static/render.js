@@ -1,16 +1,22 @@
-// The page that belongs to a state. Controls are made once and then follow the state; figures are drawn anew.
+// The page that belongs to a state.
 
-import { current, differences, isCurrent, isDescribed, nameOfRun } from "./answer.js";
-import { built, diverging, figure, frames, h, axisOf, placed, ticked } from "./figure.js";
+import { current, differences, isCurrent, isDescribed, nameOfRun, named } from "./answer.js";
+import { figure, frames, path, placed, ticked } from "./figure.js";
 import { picture, ratio, reading } from "./live.js";
-import { digits, engineering, greek, lettered, scaled } from "./notation.js";
-import { COLOURS, curvesOf, describedOf, panels, tableOf } from "./panels.js";
-import { hasEnded, isFitted, isOriginal, placeOf, same, textOf } from "./state.js";
+import { $, h, put } from "./node.js";
+import { digits, engineering, lettered, scaled } from "./notation.js";
+import { COLOURS, curvesOf, described, describedOf, panels, tableOf } from "./panels.js";
+import { hasEnded, isFitted, isOriginal, placeOf, rateOf, textOf } from "./state.js";
 
 /** @typedef {import("./state.js").State} State */
 /** @typedef {import("./state.js").Slider} Slider */
 /** @typedef {import("./figure.js").Theme} Theme */
 /** @typedef {import("./figure.js").Mark} Mark */
+/** @typedef {import("./figure.js").Panel} Panel */
+/** @typedef {import("./node.js").Node} Node */
+/** Where a state is drawn: widths of the figure and of the sections below it [pixels], and the ratio of the motion to
+ * real time that was reached.
+ * @typedef {{ isDark: boolean, isNarrow: boolean, plot: number, words: number, reached: number }} Screen */
 
 /** Steps of a slider. */
 export const STEPS = 300;
@@ -22,6 +28,8 @@ const NAMES = {
   spread: "spread of the members",
   map: "map of stability",
 };
+/** Titles of groups of sliders, and the tables of a scenario that they hold; the last one holds all others.
+ * @type {[string, string[]][]} */
 const GROUPS = [
   ["Load and mount", ["contact"]],
   ["Drive", ["drive"]],
@@ -29,100 +37,6 @@ const GROUPS = [
   ["Fluctuations", ["shear"]],
   ["Solids and adhesion", []],
 ];
-
-/** @param {string} id
- * @returns {any} */
-export const $ = (id) => document.getElementById(id);
-
-/** Return an element with a text and attributes.
- * @param {string} name
- * @param {string} text
- * @param {Record<string, any>} attributes
- * @returns {any} */
-export function element(name, text = "", attributes = {}) {
-  const result = document.createElement(name);
-  result.textContent = text;
-  for (const [key, value] of Object.entries(attributes)) result.setAttribute(key, value);
-  return result;
-}
-
-/** Make the controls of a scenario.
- * @param {State} state */
-export function build({ start }) {
-  $("title").textContent = document.title = start.title;
-  $("question").textContent = start.question;
-  for (const name of start.figures) {
-    const label = element("label");
-    label.append(element("input", "", { type: "radio", name: "figure", value: name }), ` ${NAMES[name]}`);
-    $("figures").append(label);
-  }
-  const groups = new Map(GROUPS.map(([title]) => [title, /** @type {Slider[]} */ ([])]));
-  for (const slider of start.sliders) {
-    const first = slider.key.split(".")[0];
-    const [title] = GROUPS.find(([, tables]) => tables.includes(first)) ?? GROUPS[GROUPS.length - 1];
-    groups.get(title)?.push(slider);
-  }
-  for (const [title, sliders] of groups) {
-    if (!sliders.length) continue;
-    const group = element("details", "", { open: "" });
-    group.append(element("summary", String(title)), ...sliders.map(control));
-    $("groups").append(group);
-  }
-  start.points.forEach((point, place) => {
-    const words = Object.entries(point).map(([key, value]) => {
-      const { symbol, unit } = /** @type {Slider} */ (start.sliders.find((slider) => slider.key === key));
-      return `${symbol ? lettered(symbol).join("") : key} = ${engineering(value, unit)}`;
-    });
-    if (!place) $("point").append(element("option", "none of them", { value: "" }));
-    $("point").append(element("option", words.join(", "), { value: place }));
-  });
-  $("points").hidden = !start.points.length;
-  for (const { key, name } of start.mechanisms) {
-    const label = element("label");
-    label.append(element("input", "", { type: "checkbox", value: key }), ` ${name}`);
-    $("mechanisms").append(label);
-  }
-  $("mechanisms").hidden = !start.mechanisms.length;
-  for (const { key } of start.sliders) {
-    const label = element("label");
-    label.append(element("input", "", { type: "checkbox", value: key }), ` ${key}`);
-    $("free").append(label);
-  }
-  if (start.preview.length) {
-    const reasons = start.preview.join(", and ");
-    $("preview").textContent =
-      `Preview: steady sliding is not what this scenario computes, because ${reasons}. Choose the motion, or run the scenario's own models.`;
-  }
-  $("members").value = Math.max(2, start.members);
-}
-
-/** @param {Slider} slider */
-function control(slider) {
-  const { key, meaning, symbol, marked } = slider;
-  const box = element("div", "", { class: "slider" });
-  const label = element("label", `${marked ? "★ " : ""}${meaning}${symbol ? ", " : ""}`, { for: key });
-  const [letter, index] = lettered(symbol);
-  label.append(letter, element("sub", index), " ", element("small", key));
-  const range = element("input", "", { type: "range", id: key, min: 0, max: STEPS, step: 1 });
-  const name = `${meaning}, with its unit`;
-  const text = element("input", "", {
-    type: "text",
-    id: `text ${key}`,
-    "aria-label": name,
-    autocomplete: "off",
-    spellcheck: "false",
-  });
-  const track = element("div", "", { class: "track" });
-  track.append(range);
-  box.append(label, track, text, element("p", "", { id: `fault ${key}`, class: "fault", role: "alert", hidden: "" }));
-  if (slider.over_wavelength) {
-    const choice = element("select", "", { id: "meaning", "aria-label": "What the length is" });
-    choice.append(element("option", "correlation length", { value: "" }));
-    choice.append(element("option", "wavelength of the same energy", { value: "1" }));
-    label.append(" ", choice);
-  }
-  return box;
-}
 
 /** Return the colours of figures.
  * @param {boolean} isDark
@@ -132,42 +46,38 @@ export const theme = (isDark) =>
     ? { ink: "#e8e8e8", soft: "#b0b0b0", grid: "#33363b", back: "#16181b" }
     : { ink: "#1a1a1a", soft: "#595959", grid: "#e4e4e4", back: "#ffffff" };
 
+/** What was made last under a name, with all that it depends on.
+ * @type {Map<string, { parts: any[], result: any }>} */
+const made = new Map();
+
+/** Return what was made last under a name if it depends on the same parts, else make it anew.
+ * @template T
+ * @param {string} name
+ * @param {any[]} parts
+ * @param {() => T} make
+ * @returns {T} */
+function once(name, parts, make) {
+  const last = made.get(name);
+  if (last && parts.every((part, k) => part === last.parts[k])) return last.result;
+  const result = make();
+  made.set(name, { parts, result });
+  return result;
+}
+
 /** Show a state.
  * @param {State} state
- * @param {{ isDark: boolean, isNarrow: boolean }} screen */
+ * @param {Screen} screen */
 export function render(state, screen) {
-  const { trouble, past, future, view } = state;
-  $("main").hidden = false;
-  say("trouble", trouble);
-  $("undo").disabled = !past.length;
-  $("redo").disabled = !future.length;
-  $("reset").disabled = isOriginal(state) && !state.refusal;
-  for (const item of document.querySelectorAll("#figures input")) {
-    const radio = /** @type {HTMLInputElement} */ (item);
-    radio.checked = radio.value === view.figure;
-    /** @type {HTMLElement} */ (radio.parentElement).hidden = radio.value === "data" && !state.table;
-  }
-  $("figures").hidden = document.querySelectorAll("#figures label:not([hidden])").length < 2;
-  for (const name of /** @type {const} */ (["absolute", "first", "loads"])) $(name).checked = view[name];
-  const level = Math.round(100 * view.share);
-  if (document.activeElement !== $("level") || !state.dragging) $("level").value = level;
-  $("level").setAttribute("aria-valuetext", `${level} %`);
-  $("percent").textContent = `${level} %`;
-  $("view").hidden = view.figure === "motion" || isDescribed(state);
-  $("preview").hidden = $("view").hidden || !state.start.preview.length;
-  for (const slider of state.start.sliders) follow(state, slider);
-  for (const item of document.querySelectorAll("#mechanisms input")) {
-    const box = /** @type {HTMLInputElement} */ (item);
-    box.checked = state.values[box.value] !== 0;
-  }
-  // of one mechanism alone there is no order
-  $("first").parentElement.hidden = !["lost_to_bonds", "lost_to_fluctuations"].every((name) =>
-    curvesOf(state)?.curves[name]?.some((/** @type {number} */ lost) => lost > 1e-6),
-  );
-  const place = state.start.points.findIndex((point) =>
-    Object.entries(point).every(([key, value]) => state.values[key] === value),
-  );
-  $("point").value = place < 0 ? "" : String(place);
+  const { start, trouble, past, future, view } = state;
+  document.title = start.title;
+  put("title", {}, start.title);
+  put("question", {}, start.question);
+  put("trouble", { hidden: !trouble }, trouble);
+  put("undo", { disabled: !past.length });
+  put("redo", { disabled: !future.length });
+  put("reset", { disabled: isOriginal(state) && !state.refusal });
+  choices(state);
+  sliders(state);
   words(state);
   job(state);
   data(state);
@@ -175,55 +85,127 @@ export function render(state, screen) {
   contact(state, screen);
 }
 
-/** Show a text, or hide its place.
- * @param {string} id
- * @param {string} text */
-function say(id, text) {
-  $(id).hidden = !text;
-  if ($(id).textContent !== text) $(id).textContent = text;
+/** Return an input with its label.
+ * @param {Node["attributes"]} attributes
+ * @param {string} words */
+const labelled = (attributes, words) => h("label", {}, h("input", attributes), ` ${words}`);
+
+/** Show the figures to choose from, and what can be chosen for the curves.
+ * @param {State} state */
+function choices(state) {
+  const { start, view, table, values } = state;
+  const names = start.figures.filter((name) => name !== "data" || table);
+  const figures = names.map((name) =>
+    labelled({ type: "radio", name: "figure", value: name, checked: name === view.figure }, NAMES[name]),
+  );
+  put("figures", { hidden: names.length < 2 }, h("legend", {}, "Figure"), ...figures);
+  const isOfCurves = view.figure !== "motion" && !isDescribed(state);
+  put("view", { hidden: !isOfCurves });
+  const reasons = start.preview.join(", and ");
+  const preview = `Preview: steady sliding is not what this scenario computes, because ${reasons}. Choose the motion, or run the scenario's own models.`;
+  put("preview", { hidden: !isOfCurves || !reasons }, preview);
+  for (const name of /** @type {const} */ (["absolute", "first", "loads"])) put(name, { checked: view[name] });
+  // of one mechanism alone there is no order
+  const curves = curvesOf(state)?.curves;
+  const isLost = (/** @type {string} */ name) => curves?.[name]?.some((/** @type {number} */ lost) => lost > 1e-6);
+  $("first").parentElement.hidden = !isLost("lost_to_bonds") || !isLost("lost_to_fluctuations");
+  const level = String(Math.round(100 * view.share));
+  put("level", { value: level, "aria-valuetext": `${level} %` });
+  put("percent", {}, `${level} %`);
+  const here = start.points.findIndex((point) => Object.entries(point).every(([key, value]) => values[key] === value));
+  const points = start.points.map((point, place) =>
+    h("option", { value: String(place), selected: place === here }, named(state, point).join(", ")),
+  );
+  put("points", { hidden: !points.length });
+  put("point", {}, h("option", { value: "", selected: here < 0 }, "none of them"), ...points);
+  const mechanisms = start.mechanisms.map(({ key, name }) =>
+    labelled({ type: "checkbox", name: "mechanism", value: key, checked: values[key] !== 0 }, name),
+  );
+  const legend = h("legend", { class: "seen" }, "What reduces the adhesion");
+  put("mechanisms", { hidden: !mechanisms.length }, legend, ...mechanisms);
 }
 
-/** Bring a slider to the state.
- * @param {State} state
- * @param {Slider} slider */
-function follow(state, slider) {
-  const { key } = slider;
-  const [range, text, fault] = [$(key), $(`text ${key}`), $(`fault ${key}`)];
-  const words = textOf(state, slider);
-  const place = placeOf(slider, state.values[key], STEPS);
-  if (Number(range.value) !== place) range.value = place;
-  range.setAttribute("aria-valuetext", words);
-  const refusal = state.refusal?.key === key ? state.refusal : null;
-  const isTyped = document.activeElement === text && text.value !== text.dataset.shown;
-  if (!isTyped) text.value = text.dataset.shown = refusal?.typed ? refusal.text : words;
-  text.setAttribute("aria-invalid", String(Boolean(refusal)));
-  if (refusal) text.setAttribute("aria-errormessage", `fault ${key}`);
-  else text.removeAttribute("aria-errormessage");
-  say(`fault ${key}`, refusal ? `“${refusal.text}” ${refusal.reason}; ${words} stays in use` : "");
-  fault.hidden = !refusal;
-  interval(state, slider, range.parentElement);
+/** Show the sliders in their groups.
+ * @param {State} state */
+function sliders(state) {
+  const { start, refusal } = state;
+  const numbers = isFitted(state) ? state.fit?.answer.numbers : {};
+  const titleOf = (/** @type {Slider} */ { key }) =>
+    (GROUPS.find(([, tables]) => tables.includes(key.split(".")[0])) ?? GROUPS[GROUPS.length - 1])[0];
+  const control = (/** @type {Slider} */ slider) => {
+    const { key } = slider;
+    const own = refusal?.key === key ? refusal : null;
+    // its place may have been changed by a reader, and its number taken back, without a frame between
+    const parts = [state.values[key], own, numbers[key], state.wavelength, $(key)?.value];
+    return once(key, parts, () => controlOf(state, slider, own, numbers[key]));
+  };
+  const groups = GROUPS.map(([title]) => {
+    const own = start.sliders.filter((slider) => titleOf(slider) === title);
+    return h("details", { open: "" }, h("summary", {}, title), ...own.map(control));
+  });
+  put("groups", {}, ...groups.filter(({ children }) => children.length > 1));
+  for (const { key } of start.sliders) {
+    const field = $(`text ${key}`);
+    if (isTyped(field)) continue;
+    const text = refusal?.typed && refusal.key === key ? refusal.text : $(key).getAttribute("aria-valuetext");
+    if (field.value !== text || field.dataset.shown !== text) field.value = field.dataset.shown = text;
+  }
 }
 
-/** Draw the 95 % interval of a number that was fitted, as long as the state has the numbers of the fit.
+/** Return true if a text is being written that was not read yet.
+ * @param {any} field */
+export const isTyped = (field) => document.activeElement === field && field.value !== field.dataset.shown;
+
+/** Return a slider with its field. The field has its text apart, so that none is taken from under the hands.
  * @param {State} state
  * @param {Slider} slider
- * @param {HTMLElement} track */
-function interval(state, slider, track) {
-  const number = isFitted(state) ? state.fit?.answer.numbers[slider.key] : null;
-  const known = number && [number.low, number.high].every(Number.isFinite);
-  const old = track.querySelector("svg");
-  if (!known) return void old?.remove();
-  const [from, to] = [number.low, number.high].map((end) => Math.min(STEPS, Math.max(0, placeOf(slider, end, STEPS))));
-  const bar = h("rect", { x: from, y: 0, width: Math.max(2, to - from), height: 4 });
-  const drawn = built(
+ * @param {State["refusal"]} refusal of its number
+ * @param {any} number of a fit */
+function controlOf(state, slider, refusal, number) {
+  const { key, meaning, symbol, marked } = slider;
+  const words = textOf(state, slider);
+  const [letter, index] = lettered(symbol);
+  const option = (/** @type {string} */ value, /** @type {string} */ text) =>
+    h("option", { value, selected: state.wavelength === (value !== "") }, text);
+  const lengths = [option("", "correlation length"), option("1", "wavelength of the same energy")];
+  const choice = h("select", { id: "meaning", "aria-label": "What the length is" }, ...lengths);
+  const ends = { type: "range", id: key, min: 0, max: STEPS, step: 1 };
+  const place = placeOf(slider, state.values[key], STEPS);
+  const field = { type: "text", id: `text ${key}`, "aria-label": `${meaning}, with its unit` };
+  const quiet = { autocomplete: "off", spellcheck: "false", "aria-invalid": String(Boolean(refusal)) };
+  const fault = { id: `fault ${key}`, class: "fault", role: "alert", hidden: !refusal };
+  return h(
+    "div",
+    { class: "slider" },
     h(
-      "svg",
-      { viewBox: `0 0 ${STEPS} 4`, preserveAspectRatio: "none", role: "img", "aria-label": "95 % interval of the fit" },
-      bar,
+      "label",
+      { for: key },
+      `${marked ? "★ " : ""}${meaning}${symbol ? ", " : ""}${letter}`,
+      h("sub", {}, index),
+      " ",
+      h("small", {}, key),
+      ...(slider.over_wavelength ? [" ", choice] : []),
     ),
+    h(
+      "div",
+      { class: "track" },
+      h("input", { ...ends, value: String(place), "aria-valuetext": words }),
+      ...interval(slider, number),
+    ),
+    h("input", { ...field, ...quiet, ...(refusal && { "aria-errormessage": fault.id }) }),
+    h("p", fault, refusal ? `“${refusal.text}” ${refusal.reason}; ${words} stays in use` : ""),
   );
-  if (old) old.replaceWith(drawn);
-  else track.append(drawn);
+}
+
+/** Return the 95 % interval of a number that was fitted, as long as the state has the numbers of the fit.
+ * @param {Slider} slider
+ * @param {any} number */
+function interval(slider, number) {
+  if (!number || ![number.low, number.high].every(Number.isFinite)) return [];
+  const [from, to] = [number.low, number.high].map((end) => placeOf(slider, end, STEPS));
+  const box = { viewBox: `0 0 ${STEPS} 4`, preserveAspectRatio: "none" };
+  const bar = h("rect", { x: from, y: 0, width: Math.max(2, to - from), height: 4 });
+  return [h("svg", { ...box, role: "img", "aria-label": "95 % interval of the fit" }, bar)];
 }
 
 /** Return the numbers to which the figure that is drawn belongs.
@@ -233,27 +215,25 @@ function valuesOf(state) {
   return (isDescribed(state) ? describedOf(state) : state.answers.curves)?.of.values;
 }
 
-/** Return the sentence of curves.
+/** Return the sentence of the figure.
  * @param {State} state */
-const wordsOf = (state) => (isDescribed(state) ? describedOf(state)?.answer.words : curvesOf(state)?.level.words) ?? "";
+function sentence(state) {
+  if (state.view.figure === "motion") return course(state);
+  return (isDescribed(state) ? describedOf(state)?.answer.words : curvesOf(state)?.level.words) ?? "";
+}
 
 /** Show the sentences. Those on earlier numbers are grey until new ones arrive.
  * @param {State} state */
 function words(state) {
-  const { view } = state;
-  $("lost").textContent = view.figure === "motion" ? course(state) : wordsOf(state);
-  $("lost").dataset.of = JSON.stringify(valuesOf(state));
-  const found = state.answers.words;
-  const { pin } = state;
+  const { pin, answers } = state;
+  put("lost", { "data-of": JSON.stringify(valuesOf(state)) }, sentence(state));
   const at = pin ? differences(state, pin.of.values) : "";
-  say("pinned", pin ? `Pinned${at ? ` at ${at}` : " here"}: ${pin.answer.level.words}` : "");
-  $("pin").textContent = pin ? "Unpin" : "Pin";
-  $("pin").setAttribute("aria-pressed", String(Boolean(pin)));
+  put("pinned", { hidden: !pin }, pin ? `Pinned${at ? ` at ${at}` : " here"}: ${pin.answer.level.words}` : "");
+  put("pin", { "aria-pressed": String(Boolean(pin)) }, pin ? "Unpin" : "Pin");
+  const look = { class: isCurrent(state, "words") ? "" : "earlier" };
   for (const id of ["diagnosis", "remarks"]) {
-    const lines = found?.answer[id] ?? [];
-    const old = [...$(id).children].map((item) => item.textContent);
-    if (!same(old, lines)) $(id).replaceChildren(...lines.map((/** @type {string} */ line) => element("li", line)));
-    $(id).classList.toggle("earlier", !isCurrent(state, "words"));
+    const lines = answers.words?.answer[id] ?? [];
+    put(id, look, ...lines.map((/** @type {string} */ line) => h("li", {}, line)));
   }
 }
 
@@ -286,320 +266,185 @@ function course({ motion, start }) {
   return `First member, ${extent}: ${events}${force} ${range(name, "N")}, area ${range("contact_area", "m^2")}${changed}`;
 }
 
-/** Show the job, its end, and a trace.
+/** Show the job, and its end.
  * @param {State} state */
 function job(state) {
-  const { run } = state;
-  $("stop").disabled = !state.job;
-  $("progress").hidden = !state.job;
-  $("progress").value = state.job?.done ?? 0;
-  let text = state.report;
-  if (state.job) text = state.job.left ? `${state.job.left} left` : "";
-  else if (!text && run) {
-    const { members, along } = run.answer;
-    const other = differences(state, run.of.values);
-    const many = members > 1 ? `${members} members: mean and 95 % interval` : "all members are equal: one of them";
-    const mean = members > 1 ? `mean of ${members} members with its 95 % interval` : "all members are equal";
-    const name = along === "t" ? `${mean}: ${run.answer.words}` : `${many} in the figure over the speed`;
-    text = other ? `${name}; of earlier numbers: ${nameOfRun(state)}` : name;
-  } else if (!text) text = current(state, "band")?.reason ?? "";
-  if ($("ran").textContent !== text) $("ran").textContent = text;
+  put("stop", { disabled: !state.job });
+  put("progress", { hidden: !state.job, value: state.job?.done ?? 0 });
+  const left = state.job?.left ? `${state.job.left} left` : "";
+  put("ran", {}, state.job ? left : state.report || ran(state) || (current(state, "band")?.reason ?? ""));
+}
+
+/** Return what the last ensemble was, in words.
+ * @param {State} state */
+function ran(state) {
+  if (!state.run) return "";
+  const { members, along, words } = state.run.answer;
+  const motion = members > 1 ? `mean of ${members} members with its 95 % interval` : "all members are equal";
+  const curve = members > 1 ? `${members} members: mean and 95 % interval` : "all members are equal: one of them";
+  const name = along === "t" ? `${motion}: ${words}` : `${curve} in the figure over the speed`;
+  const isEarlier = differences(state, state.run.of.values) !== "";
+  return isEarlier ? `${name}; of earlier numbers: ${nameOfRun(state)}` : name;
 }
 
 /** Show how well the curves fit the points, and the last fit.
  * @param {State} state */
 function data(state) {
-  const { fit, table } = state;
+  const { start, fit, table, unread } = state;
   const found = curvesOf(state)?.data;
-  $("free").hidden = !table;
-  $("fit").disabled = $("plan").disabled = !table || Boolean(state.job);
-  if (found) say("judged", `${found.name}: ${found.words}`);
-  else if (!$("judged").dataset.fault) say("judged", "");
-  $("fitted").hidden = !fit;
-  if (!fit) return;
+  const judged = unread || (found ? `${found.name}: ${found.words}` : "");
+  put("judged", { hidden: !judged }, judged);
+  const free = start.sliders.map(({ key }) => labelled({ type: "checkbox", value: key }, key));
+  put("free", { hidden: !table }, h("legend", { class: "seen" }, "Fit these numbers"), ...free);
+  for (const id of ["fit", "plan"]) put(id, { disabled: !table || state.job !== null });
   const isPresent = isFitted(state);
-  $("fitted").classList.toggle("earlier", !isPresent);
-  say("earlier", isPresent ? "" : "This fit is of earlier numbers or another table.");
-  $("use").hidden = isPresent;
-  $("fitted").querySelector("pre").textContent = [fit.answer.text, ...fit.answer.remarks].join("\n");
+  put("fitted", { hidden: !fit, class: isPresent ? "" : "earlier" });
+  put("earlier", { hidden: isPresent }, "This fit is of earlier numbers or another table.");
+  put("use", { hidden: isPresent });
+  put("found", {}, fit ? [fit.answer.text, ...fit.answer.remarks].join("\n") : "");
 }
 
-/** The panels that are drawn, for reading and saving.
- * @type {{ shown: import("./figure.js").Panel[], node: import("./figure.js").Node | null, width: number, shared: boolean }} */
-export const drawn = { shown: [], node: null, width: 0, shared: true };
-
-/** @type {Map<string, any[]>} */
-const seen = new Map();
-
-/** Return true if any part of what is drawn is another one than at the last call of a name.
- * @param {string} name
- * @param {any[]} parts */
-function isNew(name, parts) {
-  const before = seen.get(name);
-  seen.set(name, parts);
-  return !before || parts.some((part, k) => part !== before[k]);
-}
+/** The figure that is drawn, for reading and saving.
+ * @type {{ panels: Panel[], node: Node | null, width: number, shared: boolean, about: Node["attributes"] }} */
+export const drawn = { panels: [], node: null, width: 0, shared: true, about: {} };
 
 /** Draw the figure. While the curves of a move are under way all of it stays that of the numbers before.
  * @param {State} state
- * @param {{ isDark: boolean, isNarrow: boolean }} screen */
-function plot(state, { isDark, isNarrow }) {
+ * @param {Screen} screen */
+function plot(state, screen) {
+  const { answers, motion, view, run, pin, fit, reading: place } = state;
+  const { curves, before, others, band, shown } = answers;
+  const isMotion = view.figure === "motion";
+  put("live", { hidden: !isMotion });
+  const sources = [curves, before, others, band, shown, motion.columns, motion.pieces, view, run, pin, fit, place];
+  const parts = [...sources, screen.isDark, screen.isNarrow, screen.plot, $("numbers").open];
+  once("plot", parts, () => redraw(state, screen));
+  now(state, screen);
+}
+
+/** @param {State} state
+ * @param {Screen} screen */
+function redraw(state, { isDark, isNarrow, plot: room }) {
+  const { start, view, motion, answers } = state;
   const look = theme(isDark);
-  const isMotion = state.view.figure === "motion";
-  $("live").hidden = !isMotion;
-  const { answers, motion, view, run, pin, reading: place } = state;
-  const { curves, before, others, band, shown: described } = answers;
-  const looks = [isDark, isNarrow, $("plot").clientWidth, $("numbers").open];
-  const parts = [
-    curves,
-    before,
-    others,
-    band,
-    described,
-    motion.columns,
-    motion.pieces,
-    view,
-    run,
-    pin,
-    place,
-    ...looks,
-  ];
-  if (!isNew("plot", parts)) {
-    if (isMotion && drawn.node) now(state, { isDark });
-    return;
-  }
-  const shown = panels(state, look, isNarrow);
-  drawn.shown = shown;
-  if (!shown.length) {
-    drawn.node = null;
-    $("reader").hidden = true;
-    $("plot").replaceChildren();
-    return;
-  }
+  drawn.panels = panels(state, look, isNarrow);
+  drawn.node = null;
+  if (!drawn.panels.length) return put("reader", { hidden: true });
+  drawn.width = Math.max(300, room);
+  drawn.shared = view.figure === "motion" ? !motion.columns.normal_load : !["data", "map"].includes(view.figure);
+  // a narrow figure has fewer panels than its table
+  const wide = isNarrow ? panels(state, look, false) : drawn.panels;
   /** @type {ReturnType<typeof tableOf>} */
-  const table = describedOf(state)?.answer.table ?? tableOf(panels(state, look, false));
-  $("reader").hidden = !table.rows.length;
-  drawn.width = Math.max(300, $("plot").clientWidth);
-  drawn.shared = isMotion ? !motion.columns.normal_load : !["data", "map"].includes(view.figure);
-  const mark = readAt(state, shown, table);
-  const name = `${state.start.title}: ${NAMES[view.figure]}`;
-  const description = $("lost").textContent;
-  const about = { width: drawn.width, theme: look, title: name, description, shared: drawn.shared };
-  const isRead = (/** @type {import("./figure.js").Panel} */ { x }) => mark && x.label === shown[0].x.label;
-  const read = shown.map((panel) => (isRead(panel) ? { ...panel, marks: [...panel.marks, mark] } : panel));
-  drawn.node = figure(/** @type {import("./figure.js").Panel[]} */ (read), about);
-  $("plot").replaceChildren(built(drawn.node));
-  // a figure that is higher than a small screen would hide what is below it if it stayed in sight
-  $("plot").classList.toggle("tall", Number(drawn.node.attributes.height) > 330);
-  $("plot").dataset.of = JSON.stringify(valuesOf(state));
-  $("plot").dataset.share = state.answers.curves?.of.share;
-  if ($("numbers").open) {
-    const head = element("tr");
-    head.append(...table.head.map((text) => element("th", text, { scope: "col" })));
-    const rows = table.rows.map((row) => {
-      const line = element("tr");
-      line.append(...row.map((value) => element("td", value === null ? "–" : digits(value))));
-      return line;
-    });
-    const whole = element("table");
-    whole.append(head, ...rows);
-    $("numbers").querySelector("div").replaceChildren(whole);
-  }
-  if (isMotion) now(state, { isDark });
+  const table = describedOf(state)?.answer.table ?? tableOf(wide);
+  put("reader", { hidden: !table.rows.length });
+  const mark = readAt(state, table);
+  const across = drawn.panels[0].x.label;
+  const read = drawn.panels.map((panel) =>
+    mark && panel.x.label === across ? { ...panel, marks: [...panel.marks, mark] } : panel,
+  );
+  const name = { title: `${start.title}: ${NAMES[view.figure]}`, description: sentence(state) };
+  drawn.node = figure(read, { ...name, theme: look, width: drawn.width, shared: drawn.shared });
+  drawn.about = {
+    // a figure that is higher than a small screen would hide what is below it if it stayed in sight
+    class: Number(drawn.node.attributes.height) > 330 ? "tall" : "",
+    "data-share": answers.curves?.of.share,
+    "data-of": JSON.stringify(valuesOf(state)),
+  };
+  if (!$("numbers").open) return;
+  const head = h("tr", {}, ...table.head.map((text) => h("th", { scope: "col" }, text)));
+  const rows = table.rows.map((row) =>
+    h("tr", {}, ...row.map((value) => h("td", {}, value === null ? "–" : digits(value)))),
+  );
+  put("table", {}, h("table", {}, head, ...rows));
 }
 
 /** Show the numbers at the reading point, and return its line in the figure.
  * @param {State} state
- * @param {import("./figure.js").Panel[]} shown
  * @param {{ head: string[], rows: (number | null)[][] }} table
  * @returns {Mark | null} */
-function readAt(state, shown, table) {
-  const last = table.rows.length - 1;
-  $("at").max = String(last);
-  const place = Math.min(last, state.reading ?? 0);
-  if (Number($("at").value) !== place) $("at").value = String(place);
-  const row = table.rows[place] ?? [];
-  const { left, right } = frames(shown, drawn.width, drawn.shared);
-  $("at").style.width = `${right - left + 16}px`;
-  const words = table.head.map((text, k) => {
+function readAt(state, { head, rows }) {
+  const place = Math.min(rows.length - 1, state.reading ?? 0);
+  const row = rows[place] ?? [];
+  const { left, right } = frames(drawn.panels, drawn.width, drawn.shared);
+  const words = head.map((text, k) => {
     const [, name, unit = ""] = /^(.*?)(?: \((.*)\))?$/.exec(text) ?? [];
-    const value = row[k] === null || row[k] === undefined ? "–" : ticked(Number(digits(Number(row[k]))));
-    return `${name} ${value} ${unit}`.trim();
+    const value = row[k] ?? null;
+    return `${name} ${value === null ? "–" : ticked(Number(digits(value)))} ${unit}`.trim();
   });
-  $("at").setAttribute("aria-valuetext", words.join("; "));
-  const text = state.reading === null ? "" : words.join(" · ");
-  if ($("reading").textContent !== text) $("reading").textContent = text;
-  if (state.reading === null || row[0] === null || row[0] === undefined) return null;
+  const style = `width: ${right - left + 16}px`;
+  put("at", { max: rows.length - 1, value: String(place), style, "aria-valuetext": words.join("; ") });
+  put("reading", {}, state.reading === null ? "" : words.join(" · "));
+  if (state.reading === null || typeof row[0] !== "number") return null;
   return { kind: "rule", x: [row[0]], y: [], colour: COLOURS.own, width: 1, dash: "2 3", name: "reading" };
 }
 
-/** Pictures of maps, by the answer with the mean stress, and by its map without it.
- * @type {WeakMap<object, { href: string, side: number, most: number }>} */
-const maps = new WeakMap();
-
-/** Return a map of the stress as a picture, in which white is a given stress.
- * @param {any} found
- * @param {number} middle */
-function mapOf(found, middle) {
-  const known = maps.get(middle ? found.stress : found);
-  if (known) return known;
-  const stress = found.stress.map((/** @type {number[]} */ row) => row.map((value) => value - middle));
-  const size = stress.length;
-  const most = Math.max(...stress.flat().map(Math.abs)) || 1;
-  const canvas = element("canvas", "", { width: size, height: size });
-  const pen = canvas.getContext("2d");
-  const image = pen.createImageData(size, size);
-  // rows of the map run along the sliding direction, rows of the picture from above to below
-  for (let x = 0; x < size; x += 1) {
-    for (let y = 0; y < size; y += 1) {
-      image.data.set([...diverging(stress[x][y] / most), 255], 4 * ((size - 1 - y) * size + x));
-    }
-  }
-  pen.putImageData(image, 0, 0);
-  const result = { href: canvas.toDataURL(), side: found.side, most };
-  maps.set(middle ? found.stress : found, result);
-  return result;
-}
-
-/** Return the map of the fluctuations alone, with their energy, for the picture of the motion.
- * @param {any} found */
-function waves(found) {
-  if (!found?.stress || !(found.fluctuation_energy > 0)) return null;
-  const all = found.stress.flat();
-  const mean = all.reduce((/** @type {number} */ sum, /** @type {number} */ value) => sum + value, 0) / all.length;
-  return { ...mapOf(found, mean), energy: found.fluctuation_energy };
-}
-
-/** Draw the moment of the motion.
+/** Draw the moment of the motion, and put the figure on the page.
  * @param {State} state
- * @param {{ isDark: boolean }} screen */
-export function now(state, { isDark }) {
-  const look = theme(isDark);
-  const { motion } = state;
-  const width = Math.max(300, $("live").clientWidth);
-  const map = waves(current(state, "contact"));
-  $("waves").hidden = !map;
-  $("scene-live").replaceChildren(built(picture(state, look, width, map)));
-  $("moment").textContent = reading(state) + (motion.note ? ` · ${motion.note}` : "");
-  const ended = hasEnded(motion, state.start);
-  $("play").textContent = ended ? "Play again" : motion.paused ? "Play" : "Pause";
-  if (!drawn.node || !$("plot").firstElementChild) return;
-  const { left, right, rows } = frames(drawn.shown, drawn.width, drawn.shared);
-  const marks = drawn.shown.flatMap((panel, k) => {
+ * @param {Screen} screen */
+export function now(state, screen) {
+  const { motion, start, view } = state;
+  const isMotion = view.figure === "motion";
+  if (isMotion) {
+    const map = current(state, "contact")?.waves ?? null;
+    put("waves", { hidden: !map });
+    put("scene-live", {}, picture(state, theme(screen.isDark), Math.max(300, screen.plot), map));
+    put("moment", {}, reading(state) + (motion.note ? ` · ${motion.note}` : ""));
+    const ended = hasEnded(motion, start);
+    put("play", {}, ended ? "Play again" : motion.paused ? "Play" : "Pause");
+    const isMoving = !motion.paused && !ended && screen.reached > 0;
+    put("ratio", {}, isMoving ? `now ${ratio(screen.reached)}` : "");
+    const rates = [10, 10 / 3, 1, 1 / 3, 0.1].map((factor) => factor * rateOf(start));
+    const options = rates.map((rate) =>
+      h("option", { value: String(rate), selected: Math.abs(rate / motion.rate - 1) < 1e-6 }, ratio(rate)),
+    );
+    put("rate", {}, ...options);
+  }
+  const { node, about } = drawn;
+  if (!node) put("plot", about);
+  else if (!isMotion) put("plot", about, node);
+  else put("plot", about, { ...node, children: [...node.children, h("g", { class: "now" }, ...moment(state))] });
+}
+
+/** Return the marks of the present moment in the panels of the motion.
+ * @param {State} state */
+function moment({ motion, start }) {
+  const { left, right, rows } = frames(drawn.panels, drawn.width, drawn.shared);
+  return drawn.panels.flatMap((panel, k) => {
     const [top, bottom] = rows[k];
+    const acrossOf = placed(panel.x, left, right);
     const loop = panel.marks.find(({ name }) => name === "loop");
-    if (loop) {
-      const { x, y } = loop;
-      const place = Math.min(
-        x.length - 1,
-        motion.columns.t.findLastIndex((t) => Number(t) <= motion.time),
-      );
-      const [across, along] = [x[place], y[place]];
-      if (across === null || along === null || across === undefined || along === undefined) return [];
-      return [
-        h("circle", {
-          cx: placed(panel.x, left, right)(across),
-          cy: placed(panel.y, bottom, top)(along),
-          r: 5,
-          fill: COLOURS.fluctuations,
-        }),
-      ];
+    if (!loop) {
+      const across = acrossOf(motion.time * scaled(start.duration, "s")[0]).toFixed(1);
+      return [path(`M${across} ${top}V${bottom}`, { stroke: COLOURS.fluctuations, "stroke-width": 1.5 })];
     }
-    const [factor] = scaled(state.start.duration, "s");
-    const across = placed(panel.x, left, right)(motion.time * factor).toFixed(1);
-    return [h("path", { d: `M${across} ${top}V${bottom}`, stroke: COLOURS.fluctuations, "stroke-width": 1.5 })];
+    const last = motion.columns.t.findLastIndex((t) => Number(t) <= motion.time);
+    const place = Math.min(loop.x.length - 1, last);
+    const [across, along] = [loop.x[place] ?? null, loop.y[place] ?? null];
+    if (across === null || along === null) return [];
+    const at = { cx: acrossOf(across), cy: placed(panel.y, bottom, top)(along) };
+    return [h("circle", { ...at, r: 5, fill: COLOURS.fluctuations })];
   });
-  const svg = $("plot").firstElementChild;
-  svg.querySelector(".now")?.remove();
-  svg.append(built(h("g", { class: "now" }, ...marks)));
 }
 
-/** Show the ratio of the motion to real time, and the choices.
+/** Show the contact. One of earlier numbers is grey until a new one arrives.
  * @param {State} state
- * @param {number} rate that was reached */
-export function rates({ motion, start }, rate) {
-  if (!$("rate").options.length) {
-    for (const factor of [10, 10 / 3, 1, 1 / 3, 0.1]) {
-      $("rate").append(element("option", ratio(motion.rate * factor), { value: motion.rate * factor }));
-    }
-  }
-  const options = /** @type {HTMLOptionElement[]} */ ([...$("rate").options]);
-  options.forEach((option) => (option.selected = Math.abs(Number(option.value) / motion.rate - 1) < 1e-6));
-  const isMoving = !motion.paused && !hasEnded(motion, start);
-  const text = isMoving && rate > 0 ? `now ${ratio(rate)}` : "";
-  if ($("ratio").textContent !== text) $("ratio").textContent = text;
-}
-
-/** Draw the sphere on the half-space from the side, and the contact from above.
- * @param {State} state
- * @param {{ isDark: boolean }} screen */
-function contact(state, { isDark }) {
+ * @param {Screen} screen */
+function contact(state, { isDark, words: room }) {
   const found = current(state, "contact");
-  $("contact").classList.toggle("earlier", !found);
-  $("scene").classList.toggle("earlier", !found);
-  if (!found || !isNew("contact", [found, isDark, $("words").clientWidth])) return;
-  const { radius, speed } = found;
-  const map = found.stress ? mapOf(found, 0) : null;
-  const colours = map
-    ? `; blue is −${engineering(map.most, "Pa")} and red +${engineering(map.most, "Pa")} of one realisation of the shear stress`
-    : "";
-  $("scene").textContent = radius
-    ? `In steady sliding at ${engineering(speed, "m/s")}: contact radius ${engineering(radius, "m")}. Above: a cut through sphere and half-space, heights and widths to one scale. Below: the contact circle; dotted: JKR's circle${colours}.`
-    : "In steady sliding the contact is open.";
-  $("contact").hidden = !radius;
-  if (!radius) return;
-  const look = theme(isDark);
-  const half = found.side / 2;
-  const [factor, unit] = scaled(half, "m");
-  const scale = (/** @type {number[]} */ values) => values.map((value) => value * factor);
-  const round = Array.from({ length: 181 }, (_, k) => (k * Math.PI) / 90);
-  /** @type {(size: number, dash?: string) => Mark} */
-  const circle = (size, dash = "") => ({
-    kind: "line",
-    x: scale(round.map((angle) => size * Math.cos(angle))),
-    y: scale(round.map((angle) => size * Math.sin(angle))),
-    colour: map ? "#1a1a1a" : look.ink,
-    width: dash ? 1 : 2,
-    dash,
+  for (const id of ["contact", "scene"]) $(id).classList.toggle("earlier", !found);
+  if (!found) return;
+  once("contact", [found, isDark, room], () => {
+    put("scene", {}, found.words);
+    const look = theme(isDark);
+    const width = Math.max(300, Math.min(room, 460));
+    const shown = described(found.panels, look);
+    const { left, right } = frames(shown, width);
+    const scaled = shown.map((panel) => {
+      const ratio = (panel.y.high - panel.y.low) / (panel.x.high - panel.x.low);
+      return { ...panel, height: Math.max(30, (right - left) * ratio) };
+    });
+    const title = "The sphere from the side, to scale, and the contact circle from above";
+    const about = { id: "contact", width, theme: look, title, description: found.words };
+    put("contact", { hidden: !shown.length }, ...(shown.length ? [figure(scaled, about)] : []));
   });
-  const ends = scale([-half, half]);
-  const width = Math.max(300, Math.min($("words").clientWidth, 460));
-  const wide = { label: `along the sliding direction (${unit})`, low: ends[0], high: ends[1], log: false };
-  const heights = scale([...found.surface, ...found.sphere]);
-  const [low, high] = [Math.min(...heights), Math.max(...heights)];
-  const across = width - 62 - 14;
-  /** @type {import("./figure.js").Panel[]} */
-  const shown = [
-    {
-      x: wide,
-      y: { ...axisOf(`z (${unit})`, [[low, high]]), low, high },
-      height: Math.max(30, (across * (high - low)) / (ends[1] - ends[0])),
-      marks: [
-        { kind: "line", x: scale(found.x), y: scale(found.surface), colour: COLOURS.rest },
-        { kind: "line", x: scale(found.x), y: scale(found.sphere), colour: look.ink },
-      ],
-    },
-    {
-      x: wide,
-      y: { ...wide, label: `across (${unit})` },
-      height: across,
-      marks: [
-        ...(map ? [/** @type {Mark} */ ({ kind: "image", x: ends, y: ends, colour: "", name: map.href })] : []),
-        circle(radius),
-        ...(found.jkr_radius ? [circle(found.jkr_radius, "2 4")] : []),
-      ],
-    },
-  ];
-  const about = { width, theme: look, title: "The contact", description: $("scene").textContent };
-  const node = figure(shown, about);
-  // ids belong to the main figure
-  const svg = /** @type {Element} */ (built(node));
-  svg.querySelectorAll("[id^=figure]").forEach((item) => item.removeAttribute("id"));
-  svg.querySelectorAll("clipPath").forEach((item) => (item.id = `contact-${item.id}`));
-  svg
-    .querySelectorAll("[clip-path]")
-    .forEach((item) => item.setAttribute("clip-path", `${item.getAttribute("clip-path")}`.replace("#", "#contact-")));
-  svg.removeAttribute("aria-labelledby");
-  svg.setAttribute("aria-label", "The sphere from the side, to scale, and the contact circle from above");
-  $("contact").replaceChildren(svg);
 }

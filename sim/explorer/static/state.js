@@ -11,7 +11,7 @@ import { engineering } from "./notation.js";
 /** What the server tells once.
  * @typedef {{ title: string, question: string, path: string, stamp: string, sliders: Slider[], points: Values[],
  *   mechanisms: { key: string, name: string, on: number }[], figures: Figure[], preview: string[], members: number,
- *   duration: number, speed: number, mount: string, data: string | null }} Start */
+ *   duration: number, speed: number, mount: string, data: string | null, alone: boolean }} Start */
 /** @typedef {{ share: number, absolute: boolean, first: boolean, loads: boolean, figure: Figure }} View */
 /** @typedef {{ values: Values, view: View }} Snapshot */
 /** An answer with the question that it belongs to.
@@ -24,7 +24,7 @@ import { engineering } from "./notation.js";
  *   refusal: { key: string, text: string, reason: string, typed: boolean } | null,
  *   table: string | null, answers: Record<string, Answer>, job: { task: string, done: number, left: string } | null,
  *   report: string, run: Answer | null, pin: Answer | null, fit: (Answer & { values: Values }) | null, motion: Motion, reading: number | null,
- *   wavelength: boolean, trouble: string }} State */
+ *   wavelength: boolean, trouble: string, unread: string }} State */
 
 /** Numbers of the view that an address may hold beside those of sliders. */
 const FLAGS = /** @type {const} */ (["absolute", "first", "loads"]);
@@ -72,16 +72,19 @@ export function initial(start) {
     reading: null,
     wavelength: false,
     trouble: "",
+    unread: "",
   };
 }
 
-/** Return a motion that has not begun; it is shown in ten to twenty seconds.
+/** Return the ratio to real time at which a motion is shown in ten to twenty seconds.
+ * @param {Start} start */
+export const rateOf = (start) => 10 ** Math.min(3, Math.max(-2, Math.round(Math.log10(start.duration / 20))));
+
+/** Return a motion that has not begun.
  * @param {Start} start
  * @returns {Motion} */
 function still(start) {
-  const wanted = Math.round(Math.log10(start.duration / 20));
-  const rate = 10 ** Math.min(3, Math.max(-2, wanted));
-  const columns = { t: [] };
+  const [columns, rate] = [{ t: [] }, rateOf(start)];
   return { run: "", last: 0, steps: 0, pieces: [], columns, time: 0, paused: false, rate, note: "", words: "" };
 }
 
@@ -215,10 +218,10 @@ export function refused(state, key, text, reason) {
  * @returns {State} */
 export function answered(state, slot, of, answer) {
   const next = { ...state, answers: { ...state.answers, [slot]: { of, answer } } };
+  // the refusal of other numbers says nothing, but what is asked now may be asked again
+  if (["curves", "shown"].includes(slot) && answer.faults && !same(of.values, state.values)) return { ...state };
   if (slot !== "curves") return next;
   if (!answer.faults) return { ...next, accepted: of.values };
-  // the refusal of other numbers says nothing, but what is asked now may be asked again
-  if (!same(of.values, state.values)) return { ...state };
   const { accepted, start, touched } = state;
   const reasons = Object.values(answer.faults).join("; ");
   if (!accepted) {
@@ -281,7 +284,7 @@ export function pinned(state) {
  * @param {State} state
  * @param {string} table
  * @returns {State} */
-export const tabled = (state, table) => ({ ...state, table, fit: null });
+export const tabled = (state, table) => ({ ...state, table, fit: null, unread: "" });
 
 /** Return the state with a part of a motion.
  * @param {State} state
@@ -365,14 +368,14 @@ export function begun(state, { values, time, words }) {
  * @returns {State} */
 export const withMotion = (state, change) => ({ ...state, motion: { ...state.motion, ...change } });
 
-/** Return the place of a value on its slider.
+/** Return the place of a value on its slider, at most an end of it.
  * @param {Slider} slider
  * @param {number} value
  * @param {number} steps */
 export function placeOf(slider, value, steps) {
-  const scale = slider.logarithmic ? Math.log : (/** @type {number} */ x) => x;
-  const [low, high, at] = [slider.low, slider.high, value].map(scale);
-  return Math.round((steps * (at - low)) / (high - low));
+  const scale = slider.logarithmic ? Math.log : Number;
+  const [low, high, at] = [slider.low, slider.high, value].map((one) => scale(one));
+  return Math.min(steps, Math.max(0, Math.round((steps * (at - low)) / (high - low))));
 }
 
 /** Return the value at a place of a slider, with four digits.

@@ -2,17 +2,9 @@
 
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import {
-  axisOf,
-  figure,
-  placed,
-  spread,
-  strokes,
-  ticked,
-  ticks,
-  written,
-} from "../../../sim/explorer/static/figure.js";
+import { axisOf, figure, placed, spread, strokes, ticked, ticks } from "../../../sim/explorer/static/figure.js";
 import { at, ratio } from "../../../sim/explorer/static/live.js";
+import { written } from "../../../sim/explorer/static/node.js";
 import { engineering, greek, lettered } from "../../../sim/explorer/static/notation.js";
 
 const THEME = { ink: "#000", soft: "#555", grid: "#ddd", back: "#fff" };

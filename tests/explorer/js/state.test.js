@@ -55,7 +55,33 @@ test("curves are due after a move, and words only after the gesture", () => {
   assert.deepEqual(due(state), ["before", "curves"]);
   state = answered(state);
   assert.ok(!due(state).includes("words") && due(state).includes("others"));
-  assert.ok(due(change.rested(state)).includes("words"));
+  assert.ok(!due(state).includes("band"));
+  assert.ok(["words", "band"].every((name) => due(change.rested(state)).includes(name)));
+});
+
+test("a scenario of a single point has no others but other loads", () => {
+  const state = { ...opened(), start: { ...START, alone: true } };
+  assert.ok(!due(state).includes("others"));
+  const loads = change.viewed(state, { loads: true });
+  assert.ok(due(loads).includes("others"));
+  const shown = change.answered(loads, "others", QUESTIONS.others(loads), { others: [{}] });
+  assert.equal(current(shown, "others").others.length, 1);
+  assert.equal(current(change.viewed(shown, { loads: false }), "others"), null);
+});
+
+test("the figure of a table is asked for with the curves, and the refusal of other numbers does not take its place", () => {
+  const first = { ...opened(), table: "t" };
+  const shown = (state, answer) => change.answered(state, "shown", QUESTIONS.shown(state), answer);
+  let state = change.viewed(first, { figure: "data" });
+  state = change.answered(state, "curves", QUESTIONS.curves(state), { x: [1], level: { places: [1] } });
+  state = shown(state, { panels: [] });
+  const moved = change.moved(state, { [LOAD]: 16e-3 });
+  assert.deepEqual(due(moved), ["before", "curves", "shown"]);
+  // the curves are refused first, so that the numbers are those before
+  const back = change.answered(moved, "curves", QUESTIONS.curves(moved), { faults: { "": "no contact" } });
+  const late = change.answered(back, "shown", QUESTIONS.shown(moved), { faults: { "": "no contact" } });
+  assert.deepEqual(late.answers.shown, state.answers.shown);
+  assert.ok(isCurrent(late, "shown"));
 });
 
 test("an answer to another question is not that of the present numbers", () => {
