@@ -320,10 +320,7 @@ RUN = [
     if any("python" in words or command_lines(code) for words, code in blocks(page))
 ]
 #: Pages that are quick to run.
-QUICK = {
-    f"docs/{name}.md"
-    for name in ("cluster", "first_contact", "jkr_only", "paper", "stick_slip")
-} | {"README.md"}
+QUICK = {f"docs/{name}.md" for name in ("cluster", "jkr_only", "paper")} | {"README.md"}
 #: Pages whose numbers another test has: computed from the laws, by other commands, or by a program that makes the page.
 APART = {
     "docs/dataset.md",
