@@ -5,6 +5,7 @@ import os
 import sys
 
 import pytest
+from _pytest.doctest import DoctestModule
 
 # Tests run on all cores at once already: threads of the linear algebra would wait for each other, many times as
 # long as they work. Read when numpy is imported first, here and in every process that a test starts.
@@ -13,6 +14,13 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: A module that changes the process that imports it: only processes of ``test_portability.py`` do.
 collect_ignore = ["helpers/elsewhere"]
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file():
+    """Look for doctests in the package alone: to read the modules of tests a second time takes seconds."""
+    collectors = yield
+    return [each for each in collectors if not isinstance(each, DoctestModule)]
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -74,7 +74,12 @@ def at(name, **overrides):
     return run(load(FOLDER / f"{name}.toml", overrides))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.fixture(scope="module", params=NAMES + WHOLE)
+def name(request):
+    """The name of each scenario; its tests follow one another in one process, which runs it once."""
+    return request.param
+
+
 def test_the_statistics_of_every_scenario_have_sixty_columns_at_most(name):
     one = read.Run(four(name))
     assert len(read.frame(one).columns) <= 60
@@ -92,7 +97,6 @@ def four(name):
     )
 
 
-@pytest.mark.parametrize("name", NAMES + WHOLE)
 def test_every_scenario_opens_with_its_question_and_runs(name):
     text = (FOLDER / f"{name.removeprefix('whole ')}.toml").read_text(encoding="utf-8")
     assert text.startswith("# ") and "?" in text.partition("\n\n")[0]

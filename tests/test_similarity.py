@@ -20,15 +20,20 @@ import sim
 from sim.ensemble.dataset import scenario_json
 from sim.scenario.schema import entries
 
-UNITS = pint.UnitRegistry()
 #: Error of a speed that is looked for over its logarithm, 30 at the most, by which its roundings are multiplied.
 BY_LOGARITHM = 100.0 * np.finfo(float).eps
 
 
 @functools.cache
+def registry():
+    """Return a registry of units, which takes long to build, when a test first needs it."""
+    return pint.UnitRegistry()
+
+
+@functools.cache
 def exponents(unit):
     """Return the exponents of mass and time of a unit; lengths, angles and counts have none."""
-    parts = UNITS.Unit(unit.replace("^", "**")).dimensionality
+    parts = registry().Unit(unit.replace("^", "**")).dimensionality
     return np.array([int(parts.get(f"[{name}]", 0)) for name in ("mass", "time")])
 
 

@@ -13,7 +13,7 @@ import itertools
 import json
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -375,10 +375,8 @@ def _assembled(
 ) -> Fit:
     """Return the fit with its intervals and remarks."""
     count, places = len(problem.free), np.eye(len(best.x))
-    tried = likelihood.tried_once(problem)
     estimates = [
-        _estimate(problem, best, item, places[k], tried)
-        for k, item in enumerate(problem.free)
+        _estimate(problem, best, item, places[k]) for k, item in enumerate(problem.free)
     ]
     spread = np.sqrt(np.diag(best.covariance))
     alike = (best.covariance / np.outer(spread, spread))[:count, :count]
@@ -387,7 +385,7 @@ def _assembled(
     result = result._replace(
         scenario=scenario.with_values(result.of_table(0) if split else result.values),
         differences=tuple(
-            each for key in split for each in _between_tables(result, key, tried)
+            each for key in split for each in _between_tables(result, key)
         ),
         no_difference={key: _no_difference(result, key) for key in split},
         profiles=tuple(
@@ -404,18 +402,15 @@ def _estimate(
     best: Minimum,
     item: Free,
     weights: Array,
-    tried: Callable[[], Array],
 ) -> Estimate:
     """Return the estimate of a quantity that has some weights in all that is free."""
     value = item.outer(float(weights @ best.x))
     error = math.sqrt(weights @ best.covariance @ weights)
-    interval = likelihood.profile(problem, best, item, weights, tried)
+    interval = likelihood.profile(problem, best, item, weights)
     return Estimate(item, value, error * (value if item.logarithmic else 1.0), interval)
 
 
-def _between_tables(
-    result: Fit, key: str, tried: Callable[[], Array]
-) -> Iterator[Estimate]:
+def _between_tables(result: Fit, key: str) -> Iterator[Estimate]:
     """Yield the ratios to the first table, or the differences of a number that is not fitted in its logarithm.
 
     A bound that sets an end of either value's interval sets that of the ratio or difference.
@@ -438,7 +433,7 @@ def _between_tables(
         name = f"{key} ({stems[problem.free[k].table]} {sign} {stems[base.table]})"
         item = Free(name, quantity, start, low, high)
         weights = places[k] - places[first]
-        estimate = _estimate(problem, result.best, item, weights, tried)
+        estimate = _estimate(problem, result.best, item, weights)
         marks = result.numbers[k].interval[2:]
         others = reversed(result.numbers[first].interval[2:])
         ends = zip(estimate.interval[2:], marks, others, strict=True)

@@ -713,8 +713,8 @@ _AROUND, _DISTANCES, _BEHIND = 128, (1.0, 4.0), 4
 _ELSEWHERE = 2
 #: Most factor between the distance of an end and that of a parabola at which no other explanation is searched.
 _PARABOLIC = 1.2
-#: Relative precision of the sums of squares among which the lowest is chosen.
-_COARSE = 1e-3
+#: Relative precision of a minimum, and of the sums of squares among which the lowest is chosen.
+_PRECISION, _COARSE = 1e-8, 1e-3
 #: Relative precision of places, if that of the sum of squares is not finer.
 _FINEST = 1e-6
 #: Cosine of the least angle at which a search starts.
@@ -957,6 +957,14 @@ class Problem:
         drawn = [] if self.spring is None else [self.spring(x)]
         return np.concatenate([off, self.off_jumps(x), x[len(self.free) :], drawn])
 
+    @functools.cached_property
+    def tried(self) -> Array:
+        """Return the places of ``spread``, the one with the lowest sum of squares first."""
+        places = spread(self)
+        return places[
+            np.argsort([_sum(self, place) for place in places], kind="stable")
+        ]
+
     def off_jumps(self, x: Array) -> Array:
         """Return the deviations of the jumps into contact over their errors."""
         read = np.array([(jump.value, jump.error) for _, jump in self.jumps])
@@ -995,7 +1003,11 @@ class Problem:
 
 
 class Minimum(NamedTuple):
-    """A minimum of the sum of squares, with the covariance of what is free; ``converged`` if the search ended there."""
+    """A minimum of the sum of squares; ``converged`` if the search ended there.
+
+    ``covariance`` is that of what is free. It is nan after a coarse search, because only the sums of squares of several
+    coarse searches are compared.
+    """
 
     x: Array
     chi_square: float
@@ -1003,8 +1015,8 @@ class Minimum(NamedTuple):
     converged: bool
 
 
-def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
-    """Return the least sum of squares near a start, to a relative precision.
+def minimum(problem: Problem, start: Array, precision: float = _PRECISION) -> Minimum:
+    """Return the least sum of squares near a start, to a relative precision, and the covariance if it is the finest.
 
     The search is that of Levenberg and Marquardt (MINPACK) for angles, whose cosines are the places between the bounds.
     An angle of 0 in the middle would make the first steps zero, because they are relative to the angles.
@@ -1012,6 +1024,7 @@ def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
     if not len(start):
         chi_square = float(np.sum(problem.residuals(start) ** 2))
         return Minimum(start, chi_square, np.empty((0, 0)), True)
+    is_fine = precision <= _PRECISION
     precision = max(precision, _RUN_PRECISION) if problem.is_rough else precision
     low, high = np.transpose(problem.bounds)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -1032,7 +1045,8 @@ def minimum(problem: Problem, start: Array, precision: float = 1e-8) -> Minimum:
         max_nfev=_EVALUATIONS * (len(start) + 1),
     )
     x = place(result.x)
-    covariance = covariance_at(problem, x)
+    unknown = np.full((len(x), len(x)), np.nan)
+    covariance = covariance_at(problem, x) if is_fine else unknown
     return Minimum(x, 2.0 * result.cost, covariance, result.status > 0)
 
 
@@ -1051,7 +1065,7 @@ def lowest(problem: Problem) -> Minimum:
     """
     count = _RUN_STARTS if problem.by_run else _STARTS
     minima = [minimum(problem, problem.start, _COARSE)]
-    for place in spread_by_sum(problem)[:count]:
+    for place in problem.tried[:count]:
         with contextlib.suppress(BadInput):
             minima.append(minimum(problem, place, _COARSE))
     best = minimum(problem, min(minima, key=lambda item: item.chi_square).x)
@@ -1098,17 +1112,6 @@ def spread(problem: Problem) -> Array:
     sobol = qmc.Sobol(len(low), seed=np.random.default_rng(0))
     off = qmc.scale(sobol.random_base2(count), low, high) - problem.start
     return np.concatenate([problem.start + part * off for part in ranges])
-
-
-def spread_by_sum(problem: Problem) -> Array:
-    """Return the places of ``spread``, the one with the lowest sum of squares first."""
-    places = spread(problem)
-    return places[np.argsort([_sum(problem, place) for place in places], kind="stable")]
-
-
-def tried_once(problem: Problem) -> Callable[[], Array]:
-    """Return a function that returns the places of ``spread_by_sum``, which it finds when they are first needed."""
-    return functools.cache(functools.partial(spread_by_sum, problem))
 
 
 def with_errors(
@@ -1211,10 +1214,9 @@ def interval(
     problem: Problem,
     best: Minimum,
     k: int,
-    places: Callable[[], Array] | None = None,
 ) -> Interval:
-    """Return the 95 % interval of a free number; ``places`` as of ``profile``."""
-    return profile(problem, best, problem.free[k], np.eye(len(best.x))[k], places)
+    """Return the 95 % interval of a free number."""
+    return profile(problem, best, problem.free[k], np.eye(len(best.x))[k])
 
 
 def profile(
@@ -1222,7 +1224,6 @@ def profile(
     best: Minimum,
     item: Free,
     weights: Array,
-    places: Callable[[], Array] | None = None,
 ) -> Interval:
     """Return the interval in which the sum of squares, least over all else, stays below its bound (profile likelihood).
 
@@ -1238,17 +1239,14 @@ def profile(
         The quantity, with its bounds.
     weights : array
         Weights of all that is free, as it is fitted, in the quantity, as it is fitted.
-    places : callable, optional
-        ``tried_once`` of the problem, which several intervals share.
     """
-    places = places or tried_once(problem)
     rise = math.sqrt(
         stats.f.ppf(LEVEL, 1, problem.freedom)
         if problem.estimated.any()
         else stats.chi2.ppf(LEVEL, 1)
     )
     (low, low_open), (high, high_open) = (
-        _end(problem, best, weights, item.inner(bound), rise, places)
+        _end(problem, best, weights, item.inner(bound), rise)
         for bound in (item.low, item.high)
     )
     return Interval(item.outer(low), item.outer(high), low_open, high_open)
@@ -1322,7 +1320,6 @@ def _end(
     weights: Array,
     bound: float,
     rise: float,
-    places: Callable[[], Array],
 ) -> tuple[float, bool]:
     """Return the end of an interval on the side of a bound, and True if the bound itself is the end."""
     value, start = float(weights @ best.x), best.x
@@ -1341,7 +1338,7 @@ def _end(
         of_parabola = abs(end - value) / (rise * spread)
         if problem.is_rough or 1.0 / _PARABOLIC < of_parabola < _PARABOLIC:
             break
-        beyond = _beyond(problem, weights, bound, end, places(), spread)
+        beyond = _beyond(problem, weights, bound, end, spread)
         further = (float(weights @ beyond.x) - end) * math.copysign(1.0, bound - value)
         is_rejected = beyond.chi_square >= best.chi_square + rise**2
         if is_rejected or further < precision:
@@ -1355,7 +1352,6 @@ def _beyond(
     weights: Array,
     bound: float,
     end: float,
-    places: Array,
     spread: float,
 ) -> Minimum:
     """Return the least of the minima between an end of an interval and a bound, searched from the lowest places there.
@@ -1363,7 +1359,8 @@ def _beyond(
     A spring that acts on the wrong side of the end alone keeps the searches beyond it. It is stiff over the standard
     error of the quantity, the ``spread``.
     """
-    side, values = math.copysign(1.0, bound - end), places @ weights
+    places, side = problem.tried, math.copysign(1.0, bound - end)
+    values = places @ weights
     beyond = places[side * (values - end) > 0.0][:_ELSEWHERE]
     # of all other numbers those of the lowest places, at the bound
     off = (bound - values[:_ELSEWHERE]) / (weights @ weights)

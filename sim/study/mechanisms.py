@@ -148,7 +148,7 @@ class Search:
             if len(starts) < self.given + _STARTS and np.all(apart > _APART**2):
                 starts.append(k)
         problem = replace(self.problem, values=values)
-        return minimum(problem, self._from(values, starts).x, precision=1e-8)
+        return minimum(problem, self._from(values, starts).x)
 
     def reaches(self, values: Array, level: float) -> bool:
         """Return True if the least sum of squares for simulated values is at most a level."""

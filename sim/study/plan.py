@@ -335,9 +335,9 @@ def plan(
 
         first = design.simulated(sims, seed)
         advance()
-        expected, tried = list[Expected](), likelihood.tried_once(problem)
+        expected = list[Expected]()
         for k in range(len(numbers)):
-            expected.append(_interval(problem, k, first, tried))
+            expected.append(_interval(problem, k, first))
             advance()
         ranked = list[tuple[Point, _Design]]()
         for row in further:
@@ -470,10 +470,8 @@ def _words(scenario: Scenario, table: Measured, row: Measured) -> str:
     return (", ".join(texts) or "the same conditions") + variables
 
 
-def _interval(
-    problem: Problem, k: int, simulated: _Simulated, tried: Callable[[], Array]
-) -> Expected:
-    """Return the interval to expect for a free number, by the simulated data sets; ``tried`` as of ``profile``."""
+def _interval(problem: Problem, k: int, simulated: _Simulated) -> Expected:
+    """Return the interval to expect for a free number, by the simulated data sets."""
     item, covariance = problem.free[k], likelihood.covariance_at(problem, problem.start)
     exact = Minimum(problem.start, 0.0, covariance, True)
     levels = simulated.sums + float(stats.chi2.ppf(LEVEL, 1))
@@ -483,7 +481,7 @@ def _interval(
         search = Search(held, [held.start])
         reached = [*map(search.reaches, simulated.values, levels)]
         chances.append(Chance.of(np.array(reached)))
-    return Expected(item, likelihood.interval(problem, exact, k, tried), *chances)
+    return Expected(item, likelihood.interval(problem, exact, k), *chances)
 
 
 def figure(result: Plan) -> Figure:

@@ -407,7 +407,7 @@ CALM = LENS | {"spectrum": GAUSSIAN | {"rms": "60 kPa"}}
 BROKEN = {"model": "steady", "critical_speed": "9 um/s", "stress": "0.1 MPa"}
 
 
-def drawn(lens, count=50_000):
+def drawn(lens, count=10_000):
     """Energies ΔΓ that a cell stores, as sums of one exponential number for each pair of modes."""
     cell = modes(
         lens.fluctuations.spectrum, lens.fluctuations.side(lens.setting.cell), 256

@@ -1,5 +1,6 @@
 """Events of a run: detachment, masking, loops and friction peaks."""
 
+import functools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -397,21 +398,31 @@ def test_the_time_of_a_peak_after_a_start_is_within_its_bound_of_that_at_fine_st
         assert 1e-6 < off < float(coarse[name].bound) == 4e-3
 
 
+@functools.cache
+def along_a_ramp(is_peak, first):
+    """Return a scenario along a ramp from a speed [nm/s], whose stress falls or has a peak, and its peaks."""
+    falls = {"model": "steady", "critical_speed": "1 mm/s", "stress": "0.3 MPa"}
+    bonds_of = ALONG_A_RAMP["bonds"] if is_peak else falls
+    drive_of = {"model": "ramp", "to": "1 um/s", "scale": "log"}
+    changes = {
+        "bonds": bonds_of,
+        "drive": drive_of | {"from": f"{first} nm/s"},
+        "clock": {"duration": "40 s", "step": "0.4 s"},
+    }
+    scenario = sim.Scenario(**ALONG_A_RAMP | changes)
+    return scenario, values_of(read.peaks(run(scenario)))
+
+
 @pytest.mark.parametrize("rounding", ["compression", "precision"])
 def test_rounded_records_make_no_peak_of_a_stress_that_falls_and_keep_a_true_one(
     rounding, tmp_path
 ):
     """The stress of a simple population falls along the whole ramp, that of stretched bonds has a maximum."""
     rounded = {"compression": "digits", "precision": "float32"}[rounding]
-    parts = ALONG_A_RAMP | {"clock": {"duration": "40 s", "step": "0.4 s"}}
-    falls = {"model": "steady", "critical_speed": "1 mm/s", "stress": "0.3 MPa"}
-    ends = {"from": "1 nm/s", "to": "1 um/s", "scale": "log"}
-    for bonds_of, is_peak in ((falls, False), (parts["bonds"], True)):
+    for is_peak in (False, True):
         # many first values, of which some are rounded down
         for first in np.linspace(1.0, 2.0, 6):
-            drive_of = {"model": "ramp"} | ends | {"from": f"{first} nm/s"}
-            scenario = sim.Scenario(**parts | {"bonds": bonds_of, "drive": drive_of})
-            exact = values_of(read.peaks(run(scenario)))
+            scenario, exact = along_a_ramp(is_peak, float(first))
             path = tmp_path / f"{is_peak}{first}.nc"
             sim.run(scenario.with_values({f"record.{rounding}": rounded}), path)
             with sim.open(path) as dataset:

@@ -319,8 +319,9 @@ def test_speeds_in_steady_sliding_are_those_of_the_mean_area_of_members_with_noi
     weight, shape, _, constant = point.process.gammas
     rng = np.random.default_rng(4)
     energy = constant + rng.gamma(shape, size=(200_000, len(weight))) @ weight
-    speeds = np.geomspace(1e-5, 1e-1, 400)
     share = 0.9
+    ((result,), (is_stable,)) = speeds_of_areas(point, np.array([share]))
+    speeds = result * np.geomspace(0.5, 2.0, 61)
     works = np.linspace(0.0, WORK, 20_001)
     areas = jkr_area(works) / jkr_area(WORK)
 
@@ -329,8 +330,8 @@ def test_speeds_in_steady_sliding_are_those_of_the_mean_area_of_members_with_noi
         return np.interp(work, works, areas)
 
     curve = np.array([mean_area(speed).mean() for speed in speeds])
+    assert curve[0] > share > curve[-1]
     exact = np.exp(np.interp(-share, -curve, np.log(speeds)))
-    ((result,), (is_stable,)) = speeds_of_areas(point, np.array([share]))
     near = int(np.argmin(abs(speeds - exact)))
     slope = np.gradient(curve, np.log(speeds))[near]
     error = mean_area(exact).std() / math.sqrt(energy.size)

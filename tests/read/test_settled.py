@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.cases import some
 from helpers.draws import ornstein_uhlenbeck
 from helpers.lens import FIELD, scene
 from helpers.parts import (
@@ -47,7 +48,9 @@ def series(rng, members, times):
     return ornstein_uhlenbeck(rng, (ENSEMBLES, members, 5 * times), math.exp(-0.2))
 
 
-@pytest.mark.parametrize(("members", "times"), [(2, 5), (4, 2), (6, 20), (40, 5)])
+@pytest.mark.parametrize(
+    ("members", "times"), some([(2, 5), (4, 2), (6, 20), (40, 5)], (2, 5), (4, 2))
+)
 def test_settled_series_are_so_in_99_of_100_cases_and_their_intervals_hold_while_a_drift_is_seen(
     members, times
 ):

@@ -1,5 +1,7 @@
 """Fits to made-up curves of a known truth, with intervals that hold it; every line of ``sim paper`` holds."""
 
+import functools
+import inspect
 import itertools
 import json
 import math
@@ -12,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from helpers.cases import some
 from numpy.testing import assert_allclose
 from scipy import optimize, stats
 
@@ -428,7 +431,9 @@ def test_a_model_is_blamed_if_and_only_if_no_start_reaches_the_errors(fault, cou
         result = fit(scene, [table._replace(curves=curves)], MASKED_BY, steady=True)
         data = replace(problem, values=result.problem.values)
         starts = [truth, *rng.uniform(low, high, (30, len(low)))]
-        least = min(minimum(data, start).chi_square for start in starts)
+        # a search of one in a thousand is enough to be 0.1 below
+        minima = [minimum(data, start, precision=1e-3) for start in starts]
+        least = min(item.chi_square for item in minima)
         assert result.best.chi_square <= least + 0.1
         least = min(least, result.best.chi_square)
         is_poor = stats.chi2.sf(least, problem.freedom) <= calibration.POOR
@@ -1253,7 +1258,13 @@ def test_curves_are_doubted_beyond_errors_and_the_mechanism_that_made_them_exclu
         assert weighed(("bonds only", 40.0, 0.01, True), theory)[0] == sufficient
 
 
-def test_searches_for_drawn_curves_find_the_minima_of_many_full_refits_and_so_the_same_p_values():
+@pytest.mark.parametrize(
+    "name",
+    some(["fluctuations only", "JKR, independent of shear"], "fluctuations only"),
+)
+def test_searches_for_drawn_curves_find_the_minima_of_many_full_refits_and_so_the_same_p_values(
+    name,
+):
     slow, keys = (
         np.geomspace(1e-5, 9e-4, 8),
         [key for key in MECHANISM_KEYS if key != "bonds.stress"],
@@ -1272,33 +1283,28 @@ def test_searches_for_drawn_curves_find_the_minima_of_many_full_refits_and_so_th
         20,
     )
     others = dict(mechanisms.others(whole))
-    for name in ("fluctuations only", "JKR, independent of shear"):
-        null = mechanisms.Search(others[name], [others[name].start])
-        expected, ratios, refitted = (
-            others[name].predicted(null.least(whole.values).x),
-            [],
-            [],
+    null = mechanisms.Search(others[name], [others[name].start])
+    expected, ratios, refitted = (
+        others[name].predicted(null.least(whole.values).x),
+        [],
+        [],
+    )
+    for values in itertools.islice(mechanisms.draws_of(whole, expected, rng), draws):
+        drawn = replace(whole, values=values)
+        least = min(
+            minimum(drawn, start, precision=1e-4).chi_square for start in starts
         )
-        for values in itertools.islice(
-            mechanisms.draws_of(whole, expected, rng), draws
-        ):
-            drawn = replace(whole, values=values)
-            least = min(
-                minimum(drawn, start, precision=1e-4).chi_square for start in starts
-            )
-            poorer = minimum(
-                replace(others[name], values=values), others[name].start
-            ).chi_square
-            ratios.append(
-                null.least(values).chi_square - search.least(values).chi_square
-            )
-            refitted.append(poorer - least)
-        for share in (0.5, 0.8):
-            measured = np.quantile(refitted, share)
-            # the draws are the same, so the difference is far below that of two sets of draws
-            assert abs(
-                np.mean(np.array(ratios) >= measured) - (1.0 - share)
-            ) <= math.sqrt(share * (1.0 - share) / draws)
+        poorer = minimum(
+            replace(others[name], values=values), others[name].start
+        ).chi_square
+        ratios.append(null.least(values).chi_square - search.least(values).chi_square)
+        refitted.append(poorer - least)
+    for share in (0.5, 0.8):
+        measured = np.quantile(refitted, share)
+        # the draws are the same, so the difference is far below that of two sets of draws
+        assert abs(np.mean(np.array(ratios) >= measured) - (1.0 - share)) <= math.sqrt(
+            share * (1.0 - share) / draws
+        )
 
 
 @pytest.mark.verify
@@ -1543,7 +1549,7 @@ def test_tables_without_noise_give_their_exact_ratios_and_keys_all_per_table_giv
     assert [scene.population.critical_speed for scene in result.scenarios.values()] == [
         result.values[f"{SPEED} ({name})"] for name in THREE
     ]
-    same = {name: {} for name in THREE}
+    same = {name: {} for name in ("dry", "wet")}
     tables = condition_tables(scene, same, 0.01, 1, 0.0)
     result = fit(start, tables, ["bonds.stress"], steady=True, per_table=[SPEED])
     # chi^2 is 0 to the precision of a minimum
@@ -1551,9 +1557,10 @@ def test_tables_without_noise_give_their_exact_ratios_and_keys_all_per_table_giv
     tables = condition_tables(
         scene, {name: THREE[name] for name in ("dry", "wet")}, 0.01, 2
     )
-    result = fit(scene, tables, [], steady=True, per_table=KEYS)
-    alone = [fit(scene, [table], KEYS, steady=True) for table in tables]
-    separate = [alone[k % 2].numbers[k // 2] for k in range(2 * len(KEYS))]
+    keys = [SPEED, "bonds.stress"]
+    result = fit(scene, tables, [], steady=True, per_table=keys)
+    alone = [fit(scene, [table], keys, steady=True) for table in tables]
+    separate = [alone[k % 2].numbers[k // 2] for k in range(2 * len(keys))]
     assert_allclose(
         result.best.chi_square, sum(item.best.chi_square for item in alone), rtol=1e-7
     )
@@ -1621,6 +1628,7 @@ def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_fr
     assert is_bare == any("F distribution" in remark for remark in result.remarks)
 
 
+@pytest.mark.parametrize("is_reversed", some([False, True], False))
 @pytest.mark.parametrize(
     ("seed", "is_excluded"),
     [
@@ -1630,29 +1638,29 @@ def test_intervals_and_p_of_a_force_proportional_to_a_stress_per_table_follow_fr
     ],
 )
 def test_differences_of_values_at_a_bound_agree_with_their_chi_square_and_mark_the_ends_that_it_sets(
-    seed, is_excluded
+    seed, is_excluded, is_reversed
 ):
     key, changes = (
         "shear.spectrum.rms",
         {name: {"shear.paid_by_adhesion": 0.0} for name in ("dry", "wet")},
     )
     tables = condition_tables(load(LENS), changes, 0.02, seed)
-    for order in (tables, tables[::-1]):
-        result = fit(load(LENS), order, [SPEED], steady=True, per_table=[key])
-        (ratio,), test = result.differences, result.no_difference[key]
-        of_ratio = ratio.interval
-        assert (test.chi_square > stats.chi2.ppf(0.95, 1)) == is_excluded
-        assert test.is_limit
-        assert (of_ratio.low < 1.0 < of_ratio.high) != is_excluded
-        base, other = (item.interval for item in result.numbers[1:])
-        assert [base.low_open, other.low_open] == [
-            not (is_excluded and order is tables),
-            not (is_excluded and order is not tables),
-        ]
-        assert of_ratio[2:] == (other.low_open, base.low_open)
-        # a value at its bound has no effect, so the other one is free within its own interval, but for a correlation
-        assert not base.low_open or of_ratio.high > 0.5 * other.high / base.low
-        assert not other.low_open or of_ratio.low < 2.0 * other.low / base.high
+    order = tables[::-1] if is_reversed else tables
+    result = fit(load(LENS), order, [SPEED], steady=True, per_table=[key])
+    (ratio,), test = result.differences, result.no_difference[key]
+    of_ratio = ratio.interval
+    assert (test.chi_square > stats.chi2.ppf(0.95, 1)) == is_excluded
+    assert test.is_limit
+    assert (of_ratio.low < 1.0 < of_ratio.high) != is_excluded
+    base, other = (item.interval for item in result.numbers[1:])
+    assert [base.low_open, other.low_open] == [
+        not (is_excluded and not is_reversed),
+        not (is_excluded and is_reversed),
+    ]
+    assert of_ratio[2:] == (other.low_open, base.low_open)
+    # a value at its bound has no effect, so the other one is free within its own interval, but for a correlation
+    assert not base.low_open or of_ratio.high > 0.5 * other.high / base.low
+    assert not other.low_open or of_ratio.low < 2.0 * other.low / base.high
 
 
 def test_values_per_table_that_do_not_go_together_are_refused_in_one_line(
@@ -1698,8 +1706,17 @@ def test_values_per_table_that_do_not_go_together_are_refused_in_one_line(
 
 
 def test_the_command_writes_a_scenario_for_each_table_with_its_load_and_draws_a_colour_for_each(
-    scenario, tmp_path
+    scenario, tmp_path, monkeypatch
 ):
+    original, calls = calibration.fit, []
+    # the second command and the call in Python ask for the same fit
+    fitted_once = functools.cache(lambda: original(*calls[0].args, **calls[0].kwargs))
+
+    def recorded(*given, **named):
+        calls.append(inspect.signature(original).bind(*given, **named))
+        return fitted_once()
+
+    monkeypatch.setattr(calibration, "fit", recorded)
     conditions = {
         "dry": {},
         "wet": {SPEED: 0.02, "contact.load": 8e-3, "solid.shear_modulus": 1e6},
@@ -1749,6 +1766,11 @@ def test_the_command_writes_a_scenario_for_each_table_with_its_load_and_draws_a_
     assert not (tmp_path / "lens_fit.toml").exists()
     assert command(*words, "--force").exit_code == 0 and "(wet / dry)" in done.output
     result = sim.fit(LENS, paths, ["bonds.stress"], steady=True, per_table=[SPEED])
+    for call in calls:
+        asked = call.arguments
+        assert [*asked["free"], *asked["per_table"]] == ["bonds.stress", SPEED]
+        assert asked["steady"]
+    assert len(calls) == 3
     assert (
         f"{SPEED}: p of no difference {result.no_difference[SPEED]}"
         in repr(result).splitlines()

@@ -71,7 +71,15 @@ def test_the_interval_to_expect_from_areas_at_rest_is_the_closed_form_of_jkr(tmp
     assert any("no column has the speed" in remark for remark in result.remarks)
 
 
-def test_measured_values_are_not_used_noise_is_said_and_errors_may_have_units(tmp_path):
+@pytest.fixture
+def few_starts(monkeypatch):
+    """Fewer starts of each search: what it misses without the others is seen in ``make verify``."""
+    monkeypatch.setattr(mechanisms, "_STARTS", 2)
+
+
+def test_measured_values_are_not_used_noise_is_said_and_errors_may_have_units(
+    tmp_path, monkeypatch, few_starts
+):
     bare, valued = (
         points(tmp_path / "bare.csv", BELOW_ONSET, 3.0),
         tmp_path / "valued.csv",
@@ -111,11 +119,10 @@ def test_measured_values_are_not_used_noise_is_said_and_errors_may_have_units(tm
         "cell": "0.12 mm",
         "correlation": {"model": "slip", "length": "5 um"},
     }
-    further = tmp_path / "further.csv"
-    further.write_text("speed [mm/s]\n3\n", encoding="utf-8")
+    monkeypatch.setattr(planning, "_SPEEDS", 0)
     for shear, is_noisy in ((noisy, True), (LENS["shear"], False)):
         found = sim.plan(
-            LENS | {"shear": shear}, bare, ["bonds.critical_speed"], further, sims=50
+            LENS | {"shear": shear}, bare, ["bonds.critical_speed"], sims=50
         )
         assert any("have noise" in remark for remark in found.remarks) == is_noisy
 
@@ -157,12 +164,14 @@ def test_points_without_errors_drives_with_a_slider_and_keys_without_effect_are_
         assert "\n" not in line
 
 
-def test_a_mechanism_that_has_none_of_the_free_keys_has_no_idle_ones(tmp_path):
+def test_a_mechanism_that_has_none_of_the_free_keys_has_no_idle_ones(
+    tmp_path, monkeypatch, few_starts
+):
+    monkeypatch.setattr(planning, "_SPEEDS", 0)
     (tmp_path / "points.csv").write_text(
         "speed [mm/s],contact_area_error [%]\n0.1,1\n1,1\n3,1\n", encoding="utf-8"
     )
-    (tmp_path / "further.csv").write_text("speed [mm/s]\n2\n", encoding="utf-8")
-    files = tmp_path / "points.csv", ["shear.spectrum.rms"], tmp_path / "further.csv"
+    files = tmp_path / "points.csv", ["shear.spectrum.rms"]
     result = sim.plan("scenarios/pdms_lens.toml", *files, sims=50)
     assert set(result.probabilities) == {WHOLE, "bonds only", "fluctuations only"}
 
@@ -197,19 +206,19 @@ def test_points_that_two_standard_errors_do_not_tell_from_the_best_are_proposed_
 
 
 def test_speeds_beyond_the_candidates_are_proposed_only_if_a_probability_can_still_rise(
-    tmp_path, monkeypatch
+    tmp_path, monkeypatch, few_starts
 ):
     monkeypatch.setattr(planning, "_SPEEDS", 2)
     for error, can_rise in ((1.0, False), (20.0, True)):
         path = points(tmp_path / "points.csv", ACROSS[::3], error)
-        result = sim.plan(load(SPRUNG), path, ["bonds.critical_speed"], sims=50)
+        result = sim.plan(load(SPRUNG), path, ["shear.spectrum.rms"], sims=50)
         chances = result.best[0].probabilities.values()
         assert all(chance.probability == 1.0 for chance in chances) != can_rise
         assert any("speeds beyond" in text for text in result.remarks) == can_rise
 
 
 def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(
-    tmp_path, monkeypatch
+    tmp_path, monkeypatch, few_starts
 ):
     scenario, further = tmp_path / "lens.toml", tmp_path / "further.csv"
     scenario.write_text(written(SPRUNG), encoding="utf-8")
@@ -227,7 +236,7 @@ def test_the_command_proposes_a_point_above_the_onset_and_draws_what_it_prints(
         "--seed",
         3,
     ]
-    words += [word for key in AREA_KEYS for word in ("--free", key)]
+    words += [word for key in AREA_KEYS[1:] for word in ("--free", key)]
     original, results = planning.plan, []
     monkeypatch.setattr(
         planning,

@@ -96,10 +96,11 @@ def test_each_swept_point_is_in_the_run():
 def test_the_error_holds_at_each_swept_point_and_not_only_at_ends_and_middle():
     """Half of the contacts are masked at 220 kPa, where the mean of the fluctuations alone is off by more."""
     path = "scenarios/own_psd.toml"
+    swept = {"shear.spectrum.rms": [20e3, 80e3, 140e3, 220e3, 240e3]}
     scenes = {
-        "chosen": answer(sim.load(path), Goal(0.02)).scenario,
-        "mean": sim.load(path, {"shear.model": "mean"}),
-        "true": sim.load(path, {"ensemble.members": 2048}),
+        "chosen": answer(sim.load(path, {"sweep": swept}), Goal(0.02)).scenario,
+        "mean": sim.load(path, {"sweep": swept, "shear.model": "mean"}),
+        "true": sim.load(path, {"sweep": swept, "ensemble.members": 768}),
     }
     area = {
         name: over_members(sim.run(one), ["contact_area"], quantiles=False)
@@ -112,7 +113,7 @@ def test_the_error_holds_at_each_swept_point_and_not_only_at_ends_and_middle():
         for name, estimates in area.items()
     }
     assert (4.0 * true.sem.max("t") / unit < 0.01).all()
-    assert error["mean"].max() > 0.03 and error["mean"][[0, 5, -1]].max() < 0.02
+    assert error["mean"].max() > 0.03 and error["mean"][[0, 2, -1]].max() < 0.02
     assert (error["chosen"] < 0.02 + 4.0 * true.sem.max("t") / unit).all()
 
 
@@ -151,6 +152,7 @@ def test_what_cannot_be_combined_is_refused():
 def test_the_command_prints_the_sentence_and_stores_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = Path(__file__).parents[2].joinpath("scenarios/masking.toml").read_text()
+    text = text.replace("count = 41", "count = 5")
     Path("scene.toml").write_text(text + '\n[accuracy]\nwithin = "2 %"\n')
     shown = command("run", "scene.toml").output
     assert "within 2 %: errors of at most" in shown
@@ -255,9 +257,9 @@ def test_the_scenes_have_each_model_with_each_other():
 def test_an_accepted_error_is_said_as_it_was_given_and_no_bound_is_said_too_small():
     done = command("run", "scenarios/decomposition.toml", "--within", "200 %")
     assert done.exit_code != 0 and "below 100 %" in done.output + done.stderr
-    sentence = answer(lens(), Goal(0.0145)).sentence
+    _, sentence, attributes = answer(lens(), Goal(0.0145))
     assert sentence.startswith("within 1.45 %: ")
-    budget = json.loads(answer(lens(), Goal(0.0145)).attributes["accuracy"])["errors"]
+    budget = json.loads(attributes["accuracy"])["errors"]
     for name, bounds in budget.items():
         words, total = name.replace("_", " "), 100.0 * sum(bounds.values())
         (text,) = re.findall(rf"{words} ([\d.]+) %", sentence)
