@@ -432,19 +432,23 @@ def _tables_of(target: Path) -> tuple[Any, list[str]]:
         # of a closed file, because an open one keeps what was read in its cache
         run = read.Run(trajectories)
         shown = read.tables_of(run, _ROWS)
-        return shown, _chosen(read.notes(run, shown), every=False)
+        return shown, _chosen(read.notes(run, shown))
     except (MemoryError, OSError) as trouble:
         return [], [
             f"the output is complete, but its table could not be made: {trouble or 'not enough memory'}"
         ]
 
 
-def _chosen(notes: Any, every: bool) -> list[str]:
-    """Return the notes that are printed: those that are needed, and five in all unless ``every`` one is wanted."""
+def _chosen(notes: Any, every: bool = False, has_all: bool = False) -> list[str]:
+    """Return the notes that are printed: those that are needed, and five in all unless ``every`` one is wanted.
+
+    The last one says how to see the others, and all columns unless the tables have them.
+    """
     if every:
         return [*notes.needed, *notes.further, *notes.headings]
     room = max(_NOTES - 1 - len(notes.needed), 0)
-    more = "all columns: sim stats FILE --show all; all notes and the headings: --notes"
+    columns = "" if has_all else "all columns: sim stats FILE --show all; "
+    more = f"{columns}all notes and the headings: --notes"
     return [*notes.needed, *notes.further[:room], more]
 
 
@@ -513,7 +517,8 @@ def stats(
             read.to_long_csv(run, csv_all)
         rows = sys.maxsize if form["whole"] else _ROWS
         shown = read.tables_of(run, rows, form["show"])
-        _print_tables(shown, _chosen(read.notes(run, shown), form["every"]))
+        notes = read.notes(run, shown)
+        _print_tables(shown, _chosen(notes, form["every"], "all" in form["show"]))
         for path in filter(None, (csv, csv_all)):
             say(str(path))
 

@@ -525,6 +525,10 @@ def test_stats_and_plot_write_beside_the_dataset_or_where_asked_or_refuse_in_one
     assert len({len(row) for row in rows}) == 1
     assert sum("contact_area" in row for row in rows) == 11
     assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
+    last = "all notes and the headings: --notes"
+    assert sim("stats", dataset, "--show", "all").stdout.splitlines()[-1] == last
+    last = f"all columns: sim stats FILE --show all; {last}"
+    assert sim("stats", dataset).stdout.splitlines()[-1] == last
     # a bound or a reason, if not a speed
     assert "10 % lost" in sim("stats", dataset, "--lost", "10 %").stdout
     assert "lost 10" in sim("stats", dataset, "--lost", "10").stderr

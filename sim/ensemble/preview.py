@@ -53,6 +53,8 @@ _MOST_TABULATED = 1e8
 _MOST_WORDS = 6
 #: Estimate [s] of a run that is announced.
 _LONG = 10.0
+#: Spread of the relative area over members below which it is rounding [1].
+_ROUNDING = 1e-12
 #: Keys that are listed elsewhere than among the quantities.
 _ELSEWHERE = ("name", "sweep", *(f"{part}.model" for part in Parts._fields))
 Rows = list[tuple[str, ...]]
@@ -542,7 +544,9 @@ def _errors(plan: Plan, most: Worst | None) -> Rows:
         rows.append(
             (words, f"{area:+.2g} points of A/A_JKR, {friction:+.2g} % of the friction")
         )
-    noise = 100.0 * errors["member_spread_area"] / math.sqrt(members)
+    spread = errors["member_spread_area"]
+    # masked members differ by rounding alone
+    noise = 100.0 * spread / math.sqrt(members) if spread > _ROUNDING else 0.0
     rows.append(
         (
             "standard error",
@@ -589,8 +593,10 @@ def _slider(plan: Plan) -> Rows:
             speed for point in driven for speed in distinct_speeds(point).tolist()
         ]
         if most.stiffness > 0.0:
-            text += f" (inf: with any spring), at {engineering(most.speed, 'm/s')}"
-            if most.frequency > 0.0:
+            any_spring = " (inf: with any spring)" * math.isinf(most.stiffness)
+            text += f"{any_spring}, at {engineering(most.speed, 'm/s')}"
+            # no spring has the frequency of an infinite stiffness
+            if most.frequency > 0.0 and not any_spring:
                 text += f" with {most.frequency:.4g} Hz"
         elif speeds_of_run:
             text += f": with no spring, at {_span(speeds_of_run, 'm/s')}"

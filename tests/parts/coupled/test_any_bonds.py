@@ -328,6 +328,30 @@ def test_a_check_shows_below_which_spring_the_slider_oscillates():
         assert rows["oscillates below"].startswith(f"{onset:.4g} N/m")
         ends = f"with {frequency / (2.0 * math.pi):.4g} Hz"
         assert rows["oscillates below"].endswith(ends)
+    # first moments whose friction falls at once with the speed: no spring has a frequency there
+    falling = {
+        "clock": {"duration": "1 s", "step": "2 ms"},
+        "solid": {"youngs_modulus": "30 kPa"},
+        "sphere": {"radius": "0.5 mm"},
+        "adhesion": {"work": "30 mJ/m^2", "bond_share": 0.3},
+        "contact": {"load": "0.1 mN"},
+        "drive": {"model": "spring", "stage": "1 mm/s", "stiffness": "2 N/m"},
+        "bonds": {
+            "model": "rate",
+            "rupture": {
+                "model": "bell",
+                "critical_speed": "0.2 mm/s",
+                "bell_force": "4 pN",
+                "stress": "4 kPa",
+            },
+            "bond_stiffness": "1 uN/m",
+            "rebinding_ratio": 10,
+        },
+    }
+    assert re.search(
+        r"oscillates below +inf N/m of the spring \(inf: with any spring\), at 1 mm/s\n",
+        sim.check(falling),
+    )
     assert re.search(
         f"oscillates below +0 N/m of the spring: with no spring, at {2.0 * STRETCH:.4g} m/s\n",
         sim.check(stuck(1.0, 4, STICKING, pulled(1.0, 2.0, damping=10.0))),
