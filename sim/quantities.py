@@ -307,7 +307,7 @@ RECORDS: tuple[Definition, ...] = (
     Definition(
         "dissipated_energy",
         "J",
-        "energy dissipated by the edge and the jumps of the contact",
+        "energy dissipated by the edge and the jumps of the contact, without openings under a load",
         symbol="W",
         mean=Mean.NONE,
         heading="W",
