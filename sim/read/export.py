@@ -51,8 +51,9 @@ def frame(run: Run, show: Sequence[str] = ()) -> pd.DataFrame:
         half of the run; and the columns of ``sim stats``, each with ``<name>_error`` (the
         standard error), ``<name>_bound`` (of the error that members do not reduce) and
         ``<name>_reason`` (the reason if a value is missing or no mean), if there are any.
-        A number of the whole run is the same in all rows of its point. ``attrs["units"]``
-        holds the units by column.
+        A reason that columns over time share stands beside the first of them. A number of
+        the whole run is the same in all rows of its point. ``attrs["units"]`` holds the
+        units by column.
 
     Raises
     ------
@@ -76,7 +77,14 @@ def frame(run: Run, show: Sequence[str] = ()) -> pd.DataFrame:
         once += [column.name for column in SLIPS]
     losses = [column.name for column in of_losses(run.losses)]
     variables: dict[str, xr.DataArray] = {}
-    for group, wanted in ((each, names), (run.events, once), (run.losses, losses)):
+    for name in (name for name in names if name in each):
+        told = [variables[key] for key in variables if key.endswith("_reason")]
+        variables |= {
+            key: values
+            for key, values in _columns_of(name, each[name]).items()
+            if not any(values.equals(reason) for reason in told)
+        }
+    for group, wanted in ((run.events, once), (run.losses, losses)):
         for name in (name for name in wanted if name in group):
             variables |= _columns_of(name, group[name])
     coords = {name: run.dataset[name] for name in run.sweep}

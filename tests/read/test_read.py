@@ -230,12 +230,6 @@ def test_words_and_settings_are_known_whether_swept_or_not_and_a_run_that_is_sta
     assert read.is_steady(moved) and not read.is_stationary(moved)
     pulled = {"bonds": bonds.Steady(critical_speed=1e-2, stress=2e5)}
     pulled |= {"shear": shear.Uniform(), "clock": Clock(duration=0.1, step=1e-2)}
-    spring = drive.Spring(
-        stage=1e-6, stiffness=10.0, damping=1.0, contact_stiffness="rigid"
-    )
-    stuck = run(scene(drive=spring, **pulled))
-    assert not stuck["speed"].any() and float(stuck["friction_force"][-1]) > 0.0
-    assert read.is_steady(stuck) and not read.is_stationary(stuck)
     force = drive.Force(force=1e-4, damping=1.0, contact_stiffness="rigid")
     borne = run(scene(drive=force, **pulled))
     assert not borne["speed"].any() and read.is_stationary(borne)
