@@ -85,7 +85,6 @@ def peaks(dataset: xr.Dataset) -> Estimates:
     )
     step = setting(dataset, "clock.step")
     tolerance = _number_of(dataset, "bonds.tolerance", _ROUNDING).clip(_ROUNDING)
-    stretched = _number_of(dataset, "bonds.bond_stiffness", 0.0) > 0.0
     for name, (source, prefix) in PEAKS.items():
         if not {name, source} <= {*dataset} or differ(dataset[name]):
             continue
@@ -101,7 +100,7 @@ def peaks(dataset: xr.Dataset) -> Estimates:
             size / (1.0 + tolerance) > ends.isel(t=k, drop=True) for k in (0, 1)
         )
         since = when - beginning
-        is_hidden = start & stretched & (since < _TOO_FAST * step)
+        is_hidden = start & _rises_unseen(dataset, since)
         known = (ramp | start) & after & (~ramp | before) & ~is_hidden
         reason = xr.where(is_hidden, _UNRESOLVED, "")
         bounds = [step, xr.DataArray(0.0)]
@@ -140,6 +139,12 @@ def peaks(dataset: xr.Dataset) -> Estimates:
                 one = one._replace(bound=bound)
             result[key] = one.map(lambda each: each.drop_vars("phase", errors="ignore"))
     return result
+
+
+def _rises_unseen(dataset: xr.Dataset, since: xr.DataArray) -> xr.DataArray:
+    """Return True if a maximum is so soon after a rest [s] that the clock step does not show how the friction rises."""
+    stretched = _number_of(dataset, "bonds.bond_stiffness", 0.0) > 0.0
+    return stretched & (since < _TOO_FAST * setting(dataset, "clock.step"))
 
 
 def _number_of(dataset: xr.Dataset, key: str, default: float) -> xr.DataArray:
@@ -211,6 +216,14 @@ def static_threshold(dataset: xr.Dataset) -> Estimates:
             "static_threshold_area",
         )
     )
+    starts = word(dataset, "drive.model", "") == "start"
+    if bool(starts.any()) and "phase_start" in dataset:
+        begins = dataset["phase_start"]
+        sliding = begins.isel(phase=begins.count("phase") - 1).drop_vars(
+            "phase", errors="ignore"
+        )
+        is_hidden = starts & _rises_unseen(dataset, when - sliding)
+        force, when, area = (each.where(~is_hidden) for each in (force, when, area))
     at_rest = math.pi * dataset["radius_at_rest"] ** 2
     about = f"contact area at the {text} over that of JKR theory at rest"
     return {

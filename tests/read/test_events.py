@@ -575,6 +575,17 @@ def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_t
 
 
 @pytest.mark.parametrize(("step", "is_seen"), [(1e-5, True), (5e-2, False)])
+def test_a_clock_step_after_the_peak_of_a_start_states_no_static_threshold():
+    """The first sample of 8 ms lies beyond the peak at 5.09 ms, and the friction falls from there."""
+    scenario = sim.load(Path(__file__).parents[2] / "scenarios/static_peak.toml")
+    values = {"sweep": {}, "drive.rest": "4 s", "drive.speed": "10 um/s"}
+    values |= {"clock.duration": "4.4 s"}
+    for step, is_seen in (("8 ms", False), ("0.5 ms", True)):
+        dataset = run(scenario.with_values(values | {"clock.step": step}))
+        for one in static_threshold(dataset).values():
+            assert bool(one.value.notnull()) is is_seen
+
+
 def test_a_clock_step_that_hides_the_peak_of_a_start_states_no_peak_and_a_cure(
     step, is_seen
 ):
