@@ -574,7 +574,6 @@ def test_a_pull_from_rest_has_a_threshold_between_its_clock_steps_and_the_area_t
     assert bool(values_of(static_threshold(short)).to_dataarray().isnull().all())
 
 
-@pytest.mark.parametrize(("step", "is_seen"), [(1e-5, True), (5e-2, False)])
 def test_a_clock_step_after_the_peak_of_a_start_states_no_static_threshold():
     """The first sample of 8 ms lies beyond the peak at 5.09 ms, and the friction falls from there."""
     scenario = sim.load(Path(__file__).parents[2] / "scenarios/static_peak.toml")
@@ -586,6 +585,7 @@ def test_a_clock_step_after_the_peak_of_a_start_states_no_static_threshold():
             assert bool(one.value.notnull()) is is_seen
 
 
+@pytest.mark.parametrize(("step", "is_seen"), [(1e-5, True), (5e-2, False)])
 def test_a_clock_step_that_hides_the_peak_of_a_start_states_no_peak_and_a_cure(
     step, is_seen
 ):
