@@ -22,8 +22,11 @@ from sim.read.lifetimes import half_lives
 from sim.read.loops import mean_loops
 from sim.read.observables import defined, is_open_throughout, share_of_members
 from sim.read.peaks import (
+    UNRESOLVED,
     ageing,
+    differing,
     ensemble_peaks,
+    hidden_after_holds,
     peaks,
     peaks_after_holds,
     static_threshold,
@@ -133,6 +136,10 @@ def of_events(dataset: xr.Dataset, over: str = "") -> Estimates:
     for of_phases in filter(None, phased):
         means = summary(of_phases.assign_attrs(dataset.attrs), quantiles=False)
         result |= {f"phase_{name}": one for name, one in means.items()}
+    if "phase_peak_after_hold" in result:
+        one, is_hidden = result["phase_peak_after_hold"], hidden_after_holds(dataset)
+        reason = xr.where(is_hidden.any(differing(is_hidden)), UNRESOLVED, "")
+        result["phase_peak_after_hold"] = one._replace(reason=reason)
     result |= half_lives(dataset) | ensemble_peaks(dataset)
     return explained(_of_contacts(result, dataset), over)
 

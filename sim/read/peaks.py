@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+from collections.abc import Hashable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +29,7 @@ from sim.units.notation import engineering
 _ROUNDING = 1e-6
 #: Clock steps after a start from rest in which the friction of stretched bonds has risen too fast to show its peak.
 _TOO_FAST = 1.5
-_UNRESOLVED = (
+UNRESOLVED = (
     "the friction rises within a clock step, which may hide a peak; reduce clock.step"
 )
 #: Peaks, each with the quantity that it is of, and the beginning of the names of its time and speed.
@@ -40,9 +41,9 @@ PEAKS = {
 PLACES = {f"{prefix}_{at}" for _, prefix in PEAKS.values() for at in ("time", "speed")}
 
 
-def differ(variable: xr.DataArray) -> bool:
-    """True for a variable of which the members have different values."""
-    return bool({MEMBERS, STATISTIC} & {*variable.dims})
+def differing(variable: xr.DataArray) -> list[Hashable]:
+    """Return the dimensions of a variable over members or their statistics; none if the members have equal values."""
+    return [dim for dim in variable.dims if dim in {MEMBERS, STATISTIC}]
 
 
 def peaks(dataset: xr.Dataset) -> Estimates:
@@ -86,7 +87,7 @@ def peaks(dataset: xr.Dataset) -> Estimates:
     step = setting(dataset, "clock.step")
     tolerance = _number_of(dataset, "bonds.tolerance", _ROUNDING).clip(_ROUNDING)
     for name, (source, prefix) in PEAKS.items():
-        if not {name, source} <= {*dataset} or differ(dataset[name]):
+        if not {name, source} <= {*dataset} or differing(dataset[name]):
             continue
         ends = abs(dataset[source].astype(float)).isel(t=[0, -1])
         read = [dataset[key] for key in (name, f"{prefix}_time", f"{prefix}_speed")]
@@ -102,7 +103,7 @@ def peaks(dataset: xr.Dataset) -> Estimates:
         since = when - beginning
         is_hidden = start & _rises_unseen(dataset, since)
         known = (ramp | start) & after & (~ramp | before) & ~is_hidden
-        reason = xr.where(is_hidden, _UNRESOLVED, "")
+        reason = xr.where(is_hidden, UNRESOLVED, "")
         bounds = [step, xr.DataArray(0.0)]
         if bool(ramp.any()):
             late = _late_by_steps(dataset, when, speed)
@@ -252,17 +253,19 @@ def peaks_after_holds(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         With the dimension ``phase`` last: ``peak_after_hold`` [N], the first maximum of the friction after a rest, if
         the friction then falls by 1 % before it exceeds the maximum; ``time_held`` [s] before; and the ``start`` [s] of
-        the phase. All are nan in other phases. Empty if nothing rests before another phase.
+        the phase. All are nan in other phases, and the peak where ``hidden_after_holds`` is true. Empty if nothing
+        rests before another phase.
     """
     if "phase_static_threshold" not in dataset:
         return xr.Dataset()
     start, rests = dataset["phase_start"], dataset["phase_name"].str.contains("rest")
     held = (dataset["phase_end"] - start).where(rests).shift(phase=1)
     peak = dataset["phase_static_threshold"].astype(float)
+    is_known = held.notnull() & ~hidden_after_holds(dataset)
     result = xr.Dataset(
         {
             "peak_after_hold": labelled(
-                peak.where(held.notnull()),
+                peak.where(is_known),
                 "N",
                 "first maximum of the friction force after a hold",
             ),
@@ -271,6 +274,16 @@ def peaks_after_holds(dataset: xr.Dataset) -> xr.Dataset:
         }
     )
     return result.transpose(..., "phase")
+
+
+def hidden_after_holds(dataset: xr.Dataset) -> xr.DataArray:
+    """Return True for the phases of prescribed speed in which a clock step may hide the peak of friction.
+
+    A spring shows it, because the slider behind it moves in sub-steps.
+    """
+    is_prescribed = word(dataset, "drive.model", "") == "holds"
+    since = dataset["phase_static_threshold_time"] - dataset["phase_start"]
+    return is_prescribed & _rises_unseen(dataset, since)
 
 
 #: Decades of the time held from which on ageing is judged, and the share of the growth in the first of them above which
@@ -548,7 +561,7 @@ def ensemble_peaks(dataset: xr.Dataset) -> Estimates:
     onset = (times >= rest - 1e-6 * times[-1]).argmax("t")
     speeds = abs(speed_of(dataset)) + sweep
     for name, (quantity, prefix) in PEAKS.items():
-        if quantity not in dataset or not differ(dataset[quantity]):
+        if quantity not in dataset or not differing(dataset[quantity]):
             continue
         unit = str(dataset[quantity].attrs.get("units", "1"))
         values = xr.DataArray(np.empty((0, times.size)), dims=_EACH)

@@ -33,6 +33,7 @@ from scipy.optimize import fsolve
 import sim
 from sim.laws.schallamach import bell_peak, start_up_peak
 from sim.quantities import OPEN_THROUGHOUT, STAYS_CLOSED
+from sim.read.events import of_events
 from sim.read.peaks import ensemble_peaks, static_threshold
 from sim.read.tables import key_figures, notes, tables_of
 from sim.reports.report import answer
@@ -583,6 +584,19 @@ def test_a_clock_step_after_the_peak_of_a_start_states_no_static_threshold():
         dataset = run(scenario.with_values(values | {"clock.step": step}))
         for one in static_threshold(dataset).values():
             assert bool(one.value.notnull()) is is_seen
+
+
+def test_a_clock_step_after_the_peak_of_a_hold_states_no_peak_and_a_cure():
+    """The first sample of 8 ms lies beyond the peak of 20.3 mN at some 5 ms, and the friction falls from there."""
+    scenario = sim.load(Path(__file__).parents[2] / "scenarios/static_peak.toml")
+    values = {"sweep": {}, "clock.duration": "1.2 s"}
+    values["drive"] = {"model": "holds", "speed": "10 um/s", "slide": "0.2 s"}
+    values["drive"] |= {"holds": ["0.5 s"]}
+    for step, is_seen in (("8 ms", False), ("0.5 ms", True)):
+        dataset = run(scenario.with_values(values | {"clock.step": step}))
+        peak = of_events(dataset)["phase_peak_after_hold"].isel({"phase": 2})
+        assert bool(peak.value.notnull()) is is_seen
+        assert ("clock.step" in str(peak.reason.values)) is not is_seen
 
 
 @pytest.mark.parametrize(("step", "is_seen"), [(1e-5, True), (5e-2, False)])
