@@ -1,8 +1,9 @@
 """Latency of the page of ``sim explore`` in Chromium: ``python -m benchmarks.explore``.
 
-The page shows twelve sliders or more, measured points and the ghost of the start. A latency reaches from the event of
-an input to the frame after the drawing. The end of a job reaches from a click, a closed tab, a reload or a signal to
-the end of its process. The load of the machine is printed, because latencies depend on it.
+The page shows eighteen sliders, measured points and the ghost of the start. A latency reaches from the event of an
+input to the curve of its values in the document, and further to the frame in which it is painted. The end of a job
+reaches from a click, a closed tab, a reload or a signal to the end of its process. The load of the machine is printed,
+because latencies depend on it.
 """
 
 import contextlib
@@ -27,20 +28,22 @@ SCENARIO = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
 PRESSES, MOVES = 30, 120
 #: Keeps when the figure was first painted, and for each input when it was painted with the values of the last one.
 WATCH = """(() => {
-    window.timing = { first: null, last: null, painted: null, redraws: 0 };
+    window.timing = { first: null, last: null, drawn: null, painted: null, redraws: 0 };
     const painted = (then) => requestAnimationFrame(() => {
         const channel = new MessageChannel();
         channel.port1.onmessage = () => then(performance.now());
         channel.port2.postMessage(0);
     });
-    const begin = (event) => Object.assign(timing, { last: event.timeStamp, painted: null });
+    const begin = (event) => Object.assign(timing, { last: event.timeStamp, drawn: null, painted: null });
     document.addEventListener("input", begin, true);
     const drawn = () => {
         const plot = document.getElementById("plot");
         if (timing.first === null) painted((now) => { timing.first = performance.timeOrigin + now; });
         timing.redraws += 1;
         const input = timing.last;
-        if (input !== null && plot.dataset.of === JSON.stringify(explored.values)) painted((now) => {
+        if (input === null || plot.dataset.of !== JSON.stringify(explored.values)) return;
+        timing.drawn ??= performance.now() - input;
+        painted((now) => {
             if (timing.last === input && timing.painted === null) timing.painted = now - input;
         });
     };
@@ -95,8 +98,8 @@ def main() -> None:
             painted(page, address, 0.0)
             page.wait_for_timeout(3000)
             print(f"{page.locator('#groups input[type=range]').count()} sliders")
-            row("key press", presses(page))
-            row("last move of a drag", [dragged(page) for _ in range(3)])
+            latencies("key press", presses(page))
+            latencies("last move of a drag", [dragged(page) for _ in range(3)])
             page.locator("#members").fill("100000")
             page.locator("#run").click()
             until(
@@ -105,7 +108,7 @@ def main() -> None:
                     float(page.locator("#progress").get_attribute("value") or 0.0) > 0.0
                 ),
             )
-            row("key press beside an ensemble", presses(page))
+            latencies("key press beside an ensemble", presses(page))
             assert page.locator("#stop").is_enabled(), (
                 "the ensemble ended before the last press"
             )
@@ -201,20 +204,27 @@ def painted(page: Page, address: str, began: float) -> float:
     return float(page.evaluate("timing.first")) - 1e3 * began
 
 
-def latency(page: Page) -> float:
-    """Return the latency of the last input [ms]."""
+def latency(page: Page) -> tuple[float, float]:
+    """Return the time from the last input to its curve in the document, and to its painted frame [ms]."""
     until(page, lambda: page.evaluate("timing.painted") is not None)
-    return float(page.evaluate("timing.painted"))
+    drawn, shown = page.evaluate("[timing.drawn, timing.painted]")
+    return float(drawn), float(shown)
 
 
-def presses(page: Page) -> list[float]:
+def latencies(name: str, pairs: list[tuple[float, float]]) -> None:
+    """Print a row for the time to the curve in the document, and one for that to the painted frame."""
+    for end, values in zip(("curve", "painted"), zip(*pairs, strict=True), strict=True):
+        row(f"{name}, {end}", [*values])
+
+
+def presses(page: Page) -> list[tuple[float, float]]:
     """Press a key on the sliders in turn; return the latencies [ms]."""
     sliders = page.locator("#groups input[type=range]")
     result = []
     for number in range(PRESSES):
         slider = sliders.nth(number % sliders.count())
         slider.focus()
-        page.evaluate("timing.last = timing.painted = null")
+        page.evaluate("timing.last = timing.drawn = timing.painted = null")
         page.keyboard.press(
             "ArrowLeft"
             if slider.evaluate("(item) => item.value === item.max")
@@ -225,8 +235,8 @@ def presses(page: Page) -> list[float]:
     return result
 
 
-def dragged(page: Page) -> float:
-    """Move the first slider to and fro; return the latency of the last move [ms].
+def dragged(page: Page) -> tuple[float, float]:
+    """Move the first slider to and fro; return the latencies of the last move [ms].
 
     The page itself makes the events, because a driver waits for the page after each move and so keeps no pace.
     """
