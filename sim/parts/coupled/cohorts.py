@@ -487,12 +487,13 @@ def _slip_event(row, pool, count, place, slider, contact, law, books):
         sense * ahead, pool, count, row, time, slider, contact, law
     )
     # merged stretches reach a little beyond the limit
+    least = min(ahead, _TRIED * limit)
     if not (
         near > here
-        or here > _TRIED * (limit if is_held else math.fabs(row.spring_force))
+        or here > (least if is_held else _TRIED * math.fabs(row.spring_force))
     ):
         return -1
-    shift, low, high, begun = 0.0, 0.0, _TRIED * limit, near > 0.0
+    shift, low, high, begun = 0.0, 0.0, least, near > 0.0
     while high < 2.0 * limit:
         low, high = high, high + min(high, step)
         lacks, _, _, _, _ = _lacking(
@@ -689,10 +690,10 @@ def _piece(line, bonds, slider, contact, law, room, books):
                 )
                 new_count = -1
                 if brittle:
-                    place, at_here = (
-                        (start, _TRIED * rules.limit / unit),
-                        (first, energy),
-                    )
+                    # a slip that stays as the step shrinks may be shorter than what is tried
+                    stays = 0.5 * math.fabs(nodes[2].slip) if error < math.inf else 1.0
+                    ahead = min(_TRIED * rules.limit / unit, stays)
+                    place, at_here = (start, ahead), (first, energy)
                     new_count = _slip_event(
                         row, pool, count, place, slider, contact, law, at_here
                     )
