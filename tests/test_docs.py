@@ -400,6 +400,35 @@ def printed_by(page):
     return output.getvalue()
 
 
+def is_nearly(number, printed):
+    """True if a number is printed but for a tenth of its standard error.
+
+    Roundings differ between processors, and grow on the paths of sliders that no damping holds.
+    """
+
+    def parts(text):
+        form = re.fullmatch(r"([\d,]*)\.?(\d*)\((\d+)\)", text)
+        return form and (
+            int(form[1].replace(",", "") + form[2]),
+            len(form[2]),
+            int(form[3]),
+        )
+
+    here = parts(number)
+    return here is not None and any(
+        there[1] == here[1] and abs(np.subtract(here, there)).max() <= 0.1 * here[2]
+        for there in filter(None, map(parts, printed))
+    )
+
+
+def test_a_number_of_a_page_may_be_off_by_a_tenth_of_its_error_alone():
+    assert is_nearly("2.0699(63)", {"2.0698(63)", "12"})
+    assert is_nearly("1,000(20)", {"1002(21)"})
+    assert not is_nearly("2.0699(63)", {"2.0707(63)", "2.0699", "20699(63)"})
+    assert not is_nearly("2.0699", {"2.0698(63)", "2.0698"})
+    assert not is_nearly("5.0(2)", {"5.1(2)"})
+
+
 @pytest.mark.parametrize(
     "page",
     [
@@ -420,7 +449,8 @@ def test_what_a_page_shows_runs_and_prints_the_numbers_of_the_page(
     # README quotes a page whose commands print its numbers
     printed |= numbers_of("docs/findings.md") if page == "README.md" else set()
     stated = {*STATED.get(page, "").split()}
-    assert numbers_of(page) - inputs_of(page) - printed <= stated
+    missing = numbers_of(page) - inputs_of(page) - printed
+    assert {each for each in missing if not is_nearly(each, printed)} <= stated
     assert stated <= numbers_of(page)
 
 
