@@ -9,6 +9,8 @@ Floats = float | np.ndarray
 JKR_FROM = 5.0
 #: Equilibrium distances of two surfaces between which those of most solids lie [m].
 DISTANCES = 0.4e-9, 0.16e-9
+#: Mean shear stress over the shear modulus from about which on finite strains reduce the contact area.
+FINITE_STRAIN = 0.1
 
 
 def tabor_number(

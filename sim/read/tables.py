@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from sim.laws.limits import FINITE_STRAIN
 from sim.quantities import OPEN_THROUGHOUT, QUANTITIES, Definition, Form
 from sim.read.control_variate import control_variate, is_corrected
 from sim.read.correlation import WIDE, Array
-from sim.read.dataset import ensemble_mean, only_statistics, recorded_share
+from sim.read.dataset import MEMBERS, ensemble_mean, only_statistics, recorded_share
 from sim.read.errors import systematic_errors
 from sim.read.estimate import Estimate, Estimates
 from sim.read.observables import restricted, with_slips
@@ -453,6 +454,7 @@ def notes(run: Run, shown: Sequence[Table]) -> Notes:
     needed += [
         f"{text}{_at_points(run, at)}" for text, at in unresolved_slips(run.dataset)
     ]
+    needed += _strains(run)
     further = [*_turning(run)] if run.has_one_row_each else []
     further += [
         f"{len(each_table.rows)} of {each_table.total} rows shown; see --all, --csv FILE and --where KEY=VALUE"
@@ -596,6 +598,26 @@ def _at_points(run: Run, holds: xr.DataArray) -> str:
     }
     places = {name: run.dataset[name] for name in points}
     return _first_of(_in_words(places, points, len(indices[0])))
+
+
+def _strains(run: Run) -> Iterator[str]:
+    """Yield the largest mean stress of friction that builds up, if the strains are then not small as in the theory.
+
+    That of steady sliding is known before the run, and ``sim check`` remarks on it.
+    """
+    dataset = run.dataset
+    if not {"peak_stress", "static_threshold", "effective_shear_modulus"} <= {*dataset}:
+        return
+    largest = abs(dataset["peak_stress"].astype(float))
+    if MEMBERS in largest.dims:
+        largest = largest.mean(MEMBERS)
+    strain = ensemble_mean(largest) / dataset["effective_shear_modulus"]
+    if bool((strain > FINITE_STRAIN).any()):
+        yield (
+            f"the shear stress reaches {float(strain.max()):.2g} times the effective shear modulus"
+            f"{_at_points(run, strain == strain.max())}: finite strains, which are left out, reduce the area from about"
+            f" {FINITE_STRAIN} on"
+        )
 
 
 def _turning(run: Run) -> Iterator[str]:

@@ -10,7 +10,13 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from sim.laws.layer_table import WIDEST
-from sim.laws.limits import DISTANCES, JKR_FROM, elastocapillary_length, tabor_number
+from sim.laws.limits import (
+    DISTANCES,
+    FINITE_STRAIN,
+    JKR_FROM,
+    elastocapillary_length,
+    tabor_number,
+)
 from sim.parts.bonds.models import Demands
 from sim.parts.exchange import Array
 from sim.step.phases import phases
@@ -234,8 +240,8 @@ def _off_the_map(scene: Scene) -> Faults:
 
 #: Rms of the fluctuations over the mean stress above which a remark is made: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5
-#: Radius over that of the sphere, shear strain, and γ/E over the contact radius, above each of which a remark is made.
-LARGEST_SLOPE, LARGEST_STRAIN, LARGEST_CAPILLARITY = 0.3, 0.1, 0.1
+#: Radius over that of the sphere, and γ/E over the contact radius, above each of which a remark is made.
+LARGEST_SLOPE, LARGEST_CAPILLARITY = 0.3, 0.1
 #: Contact radius over the thickness of a layer above which a remark is made on its compressibility.
 _COMPRESSED = 10.0
 #: Surface tension of water, and so of a wet gel [N/m].
@@ -348,15 +354,15 @@ def _remarks_on_theory(scene: Scene, known: Limits) -> Iterator[str]:
             f"the contact radius reaches {known.slope:.2g} of the sphere's, beyond {LARGEST_SLOPE}: the theory is"
             f" valid for small contacts{'' if is_circle else f'; {cure}'}"
         )
-    if known.strain > LARGEST_STRAIN:
+    if known.strain > FINITE_STRAIN:
         yield (
             f"the mean stress is {known.strain:.2g} times the shear modulus: finite strains, which are left out, reduce"
-            f" the area from about {LARGEST_STRAIN} on"
+            f" the area from about {FINITE_STRAIN} on"
         )
-    if known.squeeze > LARGEST_STRAIN:
+    if known.squeeze > FINITE_STRAIN:
         yield (
             f"the sphere shears the base of the thin layer by about {known.squeeze:.2g}: the theory is valid for small"
-            f" strains, up to about {LARGEST_STRAIN}"
+            f" strains, up to about {FINITE_STRAIN}"
         )
     thickness = scene.solid.thickness
     if thickness is not None and scene.widest > _COMPRESSED * thickness:

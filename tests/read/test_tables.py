@@ -3,6 +3,7 @@
 import itertools
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -431,3 +432,25 @@ def test_the_unit_of_a_column_is_that_of_its_values_and_not_of_their_roundings()
     assert tables._column_of("N", np.array([1e-14, 2e-2]))[0] == "µN"
     zero = np.array([1e-2, 0.0]), (np.array([0.0, 1e-19]), np.nan, np.nan, 0.0)
     assert tables._column_of("N", *zero)[1] == ["10", "0"]
+
+
+def test_a_stress_of_finite_strains_is_noted_where_friction_builds_up_alone():
+    """Aged bonds bear 0.79 MPa before the slider moves, of which steady sliding leaves a tenth."""
+    static = sim.load(Path(__file__).parents[2] / "scenarios/static_peak.toml")
+    values = {"sweep": {}, "drive.rest": "4 s", "clock.duration": "4.4 s"}
+
+    def noted(**keys):
+        stated = sim.Run(sim.run(static.with_values(values | keys)))
+        strains = [text for text in tables.notes(stated, []).needed if "strain" in text]
+        return stated.dataset, strains
+
+    dataset, strains = noted(**{"drive.speed": "10 um/s"})
+    ratio = float(dataset["shear_stress"].max()) / 1.6e6
+    assert ratio > 0.4 and len(strains) == 1
+    assert f"reaches {ratio:.2g} times the effective shear modulus" in strains[0]
+    assert "(at " not in strains[0]
+    assert noted(**{"drive.speed": "30 nm/s"})[1] == []
+    stiff = noted(**{"drive.speed": "10 um/s", "solid": {"youngs_modulus": "48 MPa"}})
+    assert stiff[1] == [] and float(stiff[0]["shear_stress"].max()) > 0.1 * 1.6e6
+    swept = {"drive.speed": "10 um/s", "sweep": {"drive.rest": ["1 s", "4 s"]}}
+    assert "(at drive_rest = 4 s)" in noted(**swept)[1][0]
