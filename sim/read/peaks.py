@@ -281,7 +281,8 @@ def hidden_after_holds(dataset: xr.Dataset) -> xr.DataArray:
 
     A spring shows it, because the slider behind it moves in sub-steps.
     """
-    is_prescribed = word(dataset, "drive.model", "") == "holds"
+    drive = word(dataset, "drive.model", "")
+    is_prescribed = (drive == "holds") | (drive == "start")
     since = dataset["phase_static_threshold_time"] - dataset["phase_start"]
     return is_prescribed & _rises_unseen(dataset, since)
 

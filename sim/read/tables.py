@@ -17,7 +17,7 @@ from sim.read.errors import systematic_errors
 from sim.read.estimate import Estimate, Estimates
 from sim.read.observables import restricted, with_slips
 from sim.read.over_speed import extremes
-from sim.read.peaks import PLACES
+from sim.read.peaks import PLACES, UNRESOLVED
 from sim.read.run import Run
 from sim.read.slips import unresolved_slips
 from sim.read.statistics import QUANTILES, over_members, with_a_value
@@ -726,10 +726,12 @@ def _places(places: Places, points: Points) -> Cells:
 
 
 def _says_something(means: Estimates, column: Column, points: Points) -> bool:
-    """Return True if a column is known and not constant at its dull value at these points."""
+    """Return True if a column is known and not constant at its dull value at these points, or if a step may hide it."""
     if column.name not in means:
         return False
     one = means[column.name]
+    if one.reason is not None and bool((_at(one.reason, points) == UNRESOLVED).any()):
+        return True
     value, low, high = (_at(field, points) for field in (one.value, one.low, one.high))
     if column.definition.form is not Form.PLAIN:
         value = np.where(np.abs(value) < _ROUNDING, 0.0, value)

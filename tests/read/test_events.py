@@ -584,6 +584,8 @@ def test_a_clock_step_after_the_peak_of_a_start_states_no_static_threshold():
         dataset = run(scenario.with_values(values | {"clock.step": step}))
         for one in static_threshold(dataset).values():
             assert bool(one.value.notnull()) is is_seen
+        after = of_events(dataset)["phase_peak_after_hold"].isel({"phase": 1})
+        assert bool(after.value.notnull()) is is_seen
 
 
 def test_a_clock_step_after_the_peak_of_a_hold_states_no_peak_and_a_cure():
@@ -620,6 +622,12 @@ def test_a_clock_step_that_hides_the_peak_of_a_start_states_no_peak_and_a_cure(
     peak = read.peaks(dataset)["peak_stress"]
     assert bool(np.isfinite(peak.value)) is is_seen
     assert ("clock.step" in str(peak.reason.values)) is not is_seen
+    stated = sim.Run(dataset)
+    needed = notes(stated, tables_of(stated)).needed
+    assert (
+        any("peak of stress" in text and "clock.step" in text for text in needed)
+        is not is_seen
+    )
     cures = [text for text in made.remarks() if "rises from rest" in text]
     assert len(cures) == (not is_seen) and all("clock.step" in text for text in cures)
     if is_seen:
