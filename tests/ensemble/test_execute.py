@@ -337,6 +337,8 @@ def test_a_cluster_whose_workers_are_killed_gives_the_same_numbers(
 
         def kill(done):
             if next(counted) % 10 == 5 and len(killed) < 3:
+                # a nanny whose worker dies while it starts gives up
+                cluster.wait_for_workers(2, timeout=60)
                 worker = next(iter(cluster.workers.values()))
                 killed.append(worker.pid)
                 psutil.Process(worker.pid).kill()
