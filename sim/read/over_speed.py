@@ -132,7 +132,7 @@ def crossing(
     Quantities ``beside`` are interpolated linearly over the fall, so shares of it add up to it; their errors are alike.
     """
     free = len(groups) - 1.0
-    student = special.stdtrit(free, 0.5 + 0.5 * LEVEL) if free else 0.0
+    student = float(special.stdtrit(free, 0.5 + 0.5 * LEVEL)) if free else 0.0
     curves = np.stack([groups - level, *(beside if beside is not None else ())])
     nan, nothing = math.nan, np.full((len(curves) - 1, 5), math.nan)
     none = Crossing(nan, nan, nan, nan, nan, "", nothing)
@@ -145,104 +145,124 @@ def crossing(
         return none._replace(
             reason=_NO_CONTACT if highest > 0.0 else "the speed does not change here"
         )
-    ends_early = bool(speeds[-1] < highest)
     whole = np.sum(weight * curves, axis=1, keepdims=True)
-    if free:  # in the first row the mean, then those without each group
+    if free:
         whole = np.concatenate(
             [whole, (whole - weight * curves) / (1.0 - weight)], axis=1
         )
+    mean = whole[0, 0]
+    if mean[0] <= 0.0 and np.any(at_rest <= 0.0):
+        return none._replace(reason=_AT_REST)
+    near = _merged(x, whole, max(_NEAR, student))
+    reason = near.reason
+    if mean[0] <= 0.0:
+        reason = _FROM_REST if at_rest.size else _BEYOND[0]
+    elif not np.any(mean <= 0.0):
+        reason = _BEYOND[1 + bool(speeds[-1] < highest)]
+    low, high = math.exp(near.low), math.exp(near.high)
+    bracket = none._replace(low=low, high=high, reason=reason)
+    if not 2 <= near.place <= len(near.x) - 2:
+        return bracket
+    return _at_level(near, student) or bracket
 
-    def error(rows: Array) -> Array:
-        return (
-            np.sqrt(free * np.var(rows[1:], axis=0))
-            if free
-            else np.zeros(rows.shape[1:])
-        )
+
+class _Merged(NamedTuple):
+    """Means at logarithms of speeds, merged as far as noise hides their fall, and what is known of a level of 0.
+
+    ``whole`` has the shape (quantities, 1 + groups, speeds), of which the first row is the mean, and each other one
+    leaves a group out. The mean first reaches the level at ``place``; ``low`` and ``high`` are the next logarithms at
+    which it is above and below for sure, nan where there are none.
+    """
+
+    x: Array
+    whole: Array
+    place: int
+    low: float
+    high: float
+    reason: str
+
+
+def _jackknife(rows: Array) -> Array:
+    """Return the standard error of a first row by the others, each of which leaves a group out; 0 without others."""
+    return np.sqrt(
+        max(len(rows) - 2.0, 0.0) * np.var(rows[min(1, len(rows) - 1) :], axis=0)
+    )
+
+
+def _merged(x: Array, whole: Array, sure: float) -> _Merged:
+    """Return means about a level of 0 in blocks of speeds, two of which span ``sure`` errors to both sides of it."""
+    mean, count = whole[0, 0], len(x)
+    falls, first = bool(np.any(mean <= 0.0)), int(np.argmax(mean <= 0.0))
+    far = np.flatnonzero(np.abs(mean) > sure * _jackknife(whole[0])[first])
+    begin = max(far[far < first - 1], default=-1) + 1
+    end = min(far[far > first], default=count)
+    block = max(1, (end - begin) // 2) if falls and mean[0] > 0.0 else 1
+    edges = np.unique([0, *range(begin % block, count, block)])
+    sizes = np.diff([*edges, count])
+    x = np.add.reduceat(x, edges) / sizes
+    whole = np.add.reduceat(whole, edges, axis=-1) / sizes
+    if block > 1:
+        whole[..., 1:-1] -= np.diff(whole, 2) / 24.0
+    mean, surely = whole[0, 0], sure * _jackknife(whole[0])
+    place = int(np.argmax(mean <= 0.0)) if np.any(mean <= 0.0) else len(x)
+    before = place
+    if place == len(x) and falls:
+        # the level is reached in the noise, and nothing is known from there on
+        before = int(np.searchsorted(edges, first, side="right")) - 1
+    low = max(x[:before][mean[:before] > surely[:before]], default=math.nan)
+    high = min(x[place:][mean[place:] < -surely[place:]], default=math.nan)
+    reason = f"known only between two of {count} speeds"
+    if whole.shape[1] > 1 and (math.isnan(low) or math.isnan(high)):
+        reason = "hidden by the noise; add members"
+    return _Merged(x, whole, place, low, high, reason)
+
+
+def _at_level(near: _Merged, student: float) -> Crossing | None:
+    """Return the speed at a level of 0 and the quantities there; None if its interval is no narrower than is known.
+
+    ``student`` is the factor of the standard error.
+    """
+    begin = max(near.place - _REACH, 0)
+    x, whole = (each[..., begin : near.place + _REACH] for each in near[:2])
+    rows, k = whole[0], near.place - begin
 
     def errors(rows: Array, *coarser: Array) -> tuple[float, float, float]:
         """Return half of the interval, the standard error, and the bound of the interpolation."""
         off = (each - rows for each in coarser)
         bound = math.hypot(
-            *(math.sqrt(max(0.0, d[0] ** 2 - (_SEEN * error(d)) ** 2)) for d in off)
+            *(
+                math.sqrt(max(0.0, d[0] ** 2 - (_SEEN * _jackknife(d)) ** 2))
+                for d in off
+            )
         )
-        scatter = float(error(rows))
+        scatter = float(_jackknife(rows))
         return math.hypot(student * scatter, bound), scatter, bound
 
-    mean, surely = whole[0, 0], max(_NEAR, student) * error(whole[0])
-    if mean[0] <= 0.0 and np.any(at_rest <= 0.0):
-        return none._replace(reason=_AT_REST)
-    first = int(np.argmax(mean <= 0.0))
-    far = np.flatnonzero(np.abs(mean) > surely[first])
-    window = (
-        max(far[far < first - 1], default=-1) + 1,
-        min(far[far > first], default=len(mean)),
-    )
-    block = max(1, (window[1] - window[0]) // 2) if mean[0] > 0.0 >= mean[first] else 1
-    edges = np.unique([0, *range(window[0] % block, len(x), block)])
-    counts, count = np.diff([*edges, len(x)]), len(x)
-    x, whole = (
-        np.add.reduceat(x, edges) / counts,
-        np.add.reduceat(whole, edges, axis=-1) / counts,
-    )
-    if block > 1:
-        whole[..., 1:-1] -= np.diff(whole, 2) / 24.0
-    rows, surely = whole[0], max(_NEAR, student) * error(whole[0])
-    k = int(np.argmax(rows[0] <= 0.0)) if np.any(rows[0] <= 0.0) else len(x)
-    low = max(x[:k][rows[0, :k] > surely[:k]], default=math.nan)
-    high = min(x[k:][rows[0, k:] < -surely[k:]], default=math.nan)
-    falls = bool(np.any(mean <= 0.0))
-    if k == len(x) and falls:
-        # the level is reached in the noise, and nothing is known from there on
-        before = int(np.searchsorted(edges, first, side="right")) - 1
-        low = max(x[:before][rows[0, :before] > surely[:before]], default=math.nan)
-    reason = f"known only between two of {count} speeds"
-    if free and (math.isnan(low) or math.isnan(high)):
-        reason = "hidden by the noise; add members"
-    if k == 0 and mean[0] <= 0.0:
-        reason = _FROM_REST if at_rest.size else _BEYOND[0]
-    elif k == len(x) and not falls:
-        reason = _BEYOND[1 + ends_early]
-    bracket = none._replace(low=math.exp(low), high=math.exp(high), reason=reason)
-    if not 2 <= k <= len(x) - 2:
-        return bracket
-    near = slice(max(k - _REACH, 0), k + _REACH)
-    x, whole, rows, k = x[near], whole[..., near], rows[:, near], k - near.start
+    def over_the_fall(values: Array, a: int, b: int) -> Array:
+        """Return values at the level by a straight line between two places."""
+        share = rows[:, a] / (rows[:, a] - rows[:, b])
+        return values[:, a] + share * (values[:, b] - values[:, a])
+
     at = next(place for place in _places(x, rows[0], 0.0) if place >= x[k - 1])
-    halves = (_interpolated(x[first::2], rows[:, first::2], at) for first in (0, 1))
+    halves = (_interpolated(x[half::2], rows[:, half::2], at) for half in (0, 1))
     width, scatter, bound = errors(_interpolated(x, rows, at), *halves)
     above, below = (_places(x, rows[0], end) for end in (width, -width))
-    ends = (
-        np.fmax(low, max(above[above <= at], default=low)),
-        np.fmin(high, min(below[below >= at], default=high)),
-    )
-    if ends == (low, high) and width > 0.0:
-        return bracket
-
-    def over_the_fall(values: Array, a: int, b: int) -> Array:
-        return values[:, a] + rows[:, a] / (rows[:, a] - rows[:, b]) * (
-            values[:, b] - values[:, a]
-        )
-
-    others = [
-        [over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))]
-        for values in whole[1:]
-    ]
+    low = np.fmax(near.low, max(above[above <= at], default=near.low))
+    high = np.fmin(near.high, min(below[below >= at], default=near.high))
+    if (low, high) == (near.low, near.high) and width > 0.0:
+        return None
     intervals = []
-    for rows_beside in others:
-        value, (half, *parts) = rows_beside[0][0], errors(*rows_beside)
-        intervals.append((value, value - half, value + half, *parts))
-    speed, lowest, highest = (float(np.exp(place)) for place in (at, *ends))
+    for values in whole[1:]:
+        fine, coarse, other = (
+            over_the_fall(values, k - a, k + b) for a, b in ((1, 0), (2, 0), (1, 1))
+        )
+        half, *parts = errors(fine, coarse, other)
+        intervals.append((fine[0], fine[0] - half, fine[0] + half, *parts))
+    speed, lowest, highest = (float(np.exp(place)) for place in (at, low, high))
     # the slope of the curve turns errors of the level into errors of the speed
     slope = 0.5 * (highest - lowest) / width if width > 0.0 else 0.0
-    return Crossing(
-        speed,
-        lowest,
-        highest,
-        scatter * slope,
-        bound * slope,
-        "",
-        np.reshape(intervals, (-1, 5)),
-    )
+    others = np.reshape(intervals, (-1, 5))
+    return Crossing(speed, lowest, highest, scatter * slope, bound * slope, "", others)
 
 
 def cubics(x: Array, y: Array) -> Array:
@@ -526,10 +546,7 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
     if wanted:
         shares = {f"at_{100 * k:g}_percent_lost": k for k in wanted}
     half = 0.5 * (1.0 + hertz)
-    left = [
-        (name, half if k is None else 1.0 - k + 0.0 * hertz, loss_in_words(k))
-        for name, k in shares.items()
-    ]
+    left = [half if k is None else 1.0 - k + 0.0 * hertz for k in shares.values()]
     least = _least_area(dataset, hertz)
     means, sizes, alone = _group_means(dataset, along, bool(wanted))
     can_lose = means["area_ratio"].notnull().any(["group", along]) & (least < _WHOLE)
@@ -539,71 +556,120 @@ def loss_speeds(dataset: xr.Dataset, levels: Sequence[float | str] = ()) -> Esti
     off = xr.zeros_like(speed)
     if along == "t":
         speed, off = _without_delay(dataset, speed)
-        lasting = _if_steady(dataset, [level for _, level, _ in left], bool(wanted))
-    beside, result = means.to_array("quantity").drop_vars("quantity"), Estimates()
-    how: Any = {
-        "input_core_dims": [
+        lasting = _if_steady(dataset, left, bool(wanted))
+    result = Estimates()
+    of = "stage" if speed_name(dataset) == "stage_speed" else "slider"
+    for (name, share), level, steady in zip(shares.items(), left, lasting, strict=True):
+        loss = loss_in_words(share)
+        found = _crossings(along, speed, off, means, sizes, level)
+        lag: list[Any] = [math.nan, True]
+        if steady is not None:
+            lag = _lag(found.ends, steady[0].where(can_lose), steady[1], speed)
+        # the loss of a share that is all there is takes an infinite speed
+        never = found.ends[0].isnull() & (level <= least)
+        most = (100.0 * (1.0 - least)).clip(0.0)
+        meanings = {
+            key: f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
+            for key in found.beside
+        }
+        meanings["area_ratio"] = (
+            f"speed of the {of} at which the mean contact area has lost {loss}"
+        )
+        result |= _stated(found, name, meanings, (never, most, *lag), alone)
+        if steady is not None and bool((lag[0].notnull() & lag[1]).any()):
+            text_of_steady = f"sliding speed at which steady sliding loses {loss}"
+            value = labelled(lag[0].where(lag[1]), "m/s", text_of_steady)
+            result[f"steady_speed_{name}"] = Estimate(value)
+    return result
+
+
+class _Crossings(NamedTuple):
+    """Speeds of one loss over the sweep: with interval, error and bound, and the reasons without.
+
+    ``beside`` holds the shares of the loss at that speed by their names, with the dimension "end" as ``ends``;
+    ``by_steps`` is true if the clock step causes most of a bound.
+    """
+
+    ends: list[xr.DataArray]
+    reason: xr.DataArray
+    beside: dict[str, xr.DataArray]
+    by_steps: bool
+
+
+def _crossings(
+    along: str,
+    speed: xr.DataArray,
+    off: xr.DataArray,
+    means: xr.Dataset,
+    sizes: xr.DataArray,
+    level: xr.DataArray,
+) -> _Crossings:
+    """Return the speeds at which the area of groups falls to a level; ``off``: by how much the step may shift them."""
+    beside = means.to_array("quantity").drop_vars("quantity")
+    *ends, reason, others = xr.apply_ufunc(
+        crossing,
+        *(speed, means["area_ratio"], sizes, level, beside),
+        input_core_dims=[
             [along],
             ["group", along],
             ["group"],
             [],
             ["quantity", "group", along],
-        ]
-    }
-    how |= {
-        "output_core_dims": [*[[]] * 6, ["quantity", "end"]],
-        "output_dtypes": [*"dddddOd"],
-        "vectorize": True,
-    }
-    at_a_speed: Any = {"input_core_dims": [[], [along], [along]], "vectorize": True}
-    for (name, level, loss), steady in zip(left, lasting, strict=True):
-        *ends, why, others = xr.apply_ufunc(
-            crossing, speed, means["area_ratio"], sizes, level, beside, **how
+        ],
+        output_core_dims=[*[[]] * 6, ["quantity", "end"]],
+        output_dtypes=[*"dddddOd"],
+        vectorize=True,
+    )
+    late = xr.apply_ufunc(
+        _read_at,
+        *(ends[0], speed, off),
+        input_core_dims=[[], [along], [along]],
+        vectorize=True,
+    )
+    share = (late / ends[0]).fillna(0.0)
+    ends[1], ends[2] = ends[1] * np.exp(-share), ends[2] * np.exp(share)
+    ends[4] = ends[4] + late
+    columns = zip(means, others.transpose("quantity", "end", ...), strict=True)
+    known = {str(name): one for name, one in columns}
+    return _Crossings(ends, reason, known, bool((late > 0.5 * ends[4]).any()))
+
+
+def _stated(
+    found: _Crossings,
+    name: str,
+    meanings: dict[str, str],
+    why: Sequence[Any],
+    alone: bool,
+) -> Estimates:
+    """Return the speed of a loss by its name, and the shares of the loss there, with reasons where there is none.
+
+    ``why``: where the loss never happens, the largest loss, the speed in steady sliding and where that is stable.
+    ``alone``: a single member has no error.
+    """
+    result, never = Estimates(), why[0]
+    columns = found.beside | {"area_ratio": xr.concat(found.ends, "end")}
+    of_one = found.ends[0].notnull() & alone
+    for key, (value, *intervals, bound) in columns.items():
+        stem, unit, source = key, "1", "interpolation"
+        if key == "area_ratio":
+            stem, unit, source = "speed", "m/s", _CAUSES[found.by_steps]
+        low, high, error = (each.where(~never & ~of_one) for each in intervals)
+        reason = xr.apply_ufunc(
+            _in_words,
+            found.reason,
+            *why,
+            of_one,
+            vectorize=True,
+            output_dtypes=[object],
         )
-        # the loss of a share that is all there is takes an infinite speed
-        is_known, never = ends[0].notnull(), ends[0].isnull() & (level <= least)
-        late = xr.apply_ufunc(_read_at, ends[0], speed, off, **at_a_speed)
-        share = (late / ends[0]).fillna(0.0)
-        ends[1], ends[2] = ends[1] * np.exp(-share), ends[2] * np.exp(share)
-        ends[4] = ends[4] + late
-        columns = dict(
-            zip(means, others.transpose("quantity", "end", ...), strict=True)
+        result[f"{stem}_{name}"] = Estimate(
+            labelled(value.where(~never), unit, meanings[key]),
+            error,
+            low,
+            high,
+            bound.where(~never).assign_attrs(source=source),
+            reason=reason.drop_attrs(deep=False),
         )
-        columns["area_ratio"] = xr.concat(ends, "end")
-        by_steps = bool((late > 0.5 * ends[4]).any())
-        lag: list[Any] = [math.nan, True]
-        if steady is not None:
-            lag = _lag(ends, steady[0].where(can_lose), steady[1], speed)
-        for key, numbers in columns.items():
-            stem, unit, source = str(key), "1", "interpolation"
-            text = f"{means[key].attrs.get('long_name', '')}, at the speed at which {loss} is lost"
-            if key == "area_ratio":
-                stem, unit, source = "speed", "m/s", _CAUSES[by_steps]
-                of = "stage" if speed_name(dataset) == "stage_speed" else "slider"
-                text = (
-                    f"speed of the {of} at which the mean contact area has lost {loss}"
-                )
-            value, *intervals, bound = numbers
-            low, high, error = (
-                each.where(~never & ~(is_known & alone)) for each in intervals
-            )
-            most = (100.0 * (1.0 - least)).clip(0.0)
-            further = [why, never, most, *lag, is_known & alone]
-            reason = xr.apply_ufunc(
-                _in_words, *further, vectorize=True, output_dtypes=[object]
-            )
-            result[f"{stem}_{name}"] = Estimate(
-                labelled(value.where(~never), unit, text),
-                error,
-                low,
-                high,
-                bound.where(~never).assign_attrs(source=source),
-                reason=reason.drop_attrs(deep=False),
-            )
-        if steady is not None and bool((lag[0].notnull() & lag[1]).any()):
-            text = f"sliding speed at which steady sliding loses {loss}"
-            value = labelled(lag[0].where(lag[1]), "m/s", text)
-            result[f"steady_speed_{name}"] = Estimate(value)
     return result
 
 
