@@ -25,7 +25,7 @@ from sim.read.dataset import (
     stays_held,
 )
 from sim.read.estimate import Estimate, Estimates
-from sim.read.events import jumps
+from sim.read.events import jumps, time_of_jump_in, time_of_pull_off
 from sim.read.late import distribution
 from sim.read.over_speed import speed_dim
 from sim.read.statistics import FOR_TAILS, averaging, over_members, with_a_value
@@ -47,6 +47,9 @@ SIGNS: Any = {
     "pull-off": {"marker": "x", "markersize": 4, "linestyle": "none", "zorder": 3},
     "jump-in": style.HOLLOW | {"mew": 0.8, "zorder": 3},
 }
+
+#: Variables of an x axis that go on while a contact opens or closes.
+_PRESCRIBED = "t", "speed", "stage_speed", "displacement"
 
 
 class Statistics:
@@ -280,7 +283,7 @@ def curve(panel: Axes, scene: Scene, name: str, line: Line, factor: float) -> No
 
 
 def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
-    """Draw the curves of a contact: a cross at each pull-off of the last member in contact, a ring at each jump-in."""
+    """Draw the curves of a contact: a cross at each pull-off of the last member in contact, a ring at a jump-in."""
     for line in scene.lines:
         curve(panel, scene, name, line, factor)
         if name in _OF_CONTACT:
@@ -306,14 +309,36 @@ def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
 
 
 def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float) -> None:
-    """Draw a cross at each pull-off and a ring at each jump-in of a curve, at the ends of its parts."""
-    x, mean = scene.x[line.number], factor * scene.values(name, line)
-    known, (off, on) = np.flatnonzero(np.isfinite(mean)), scene.openings(line)
-    places = np.searchsorted(known, off, "right") - 1, np.searchsorted(known, on)
-    for (words, sign), place in zip(SIGNS.items(), places, strict=True):
-        if place.size and known.size:
-            at = known.take(place, mode="clip")
-            panel.plot(x[at], mean[at], color=line.colour, label=words, **sign)
+    """Draw a cross at each pull-off and a ring at the first jump-in of a curve, at their recorded times.
+
+    Between records the height is that of the nearest end of the curve, because none is recorded at the jump. A pull-off
+    or a jump-in without a recorded time has no mark.
+    """
+    dataset, mean = scene.statistics.dataset, factor * scene.values(name, line)
+    dataset = dataset.isel(line.point, missing_dims="ignore")
+    clock, known = dataset["t"].to_numpy(), np.isfinite(mean)
+    places, closed = scene.x[line.number], ~scene.opened(line)
+    is_shown = np.full(clock.size, True) if line.shown is None else line.shown
+    stretches = np.cumsum(np.append(False, np.diff(closed.astype(int)) > 0))
+    of_some = MEMBERS in dataset.dims
+    off, on = scene.openings(line)
+    for records, time_of, sign, words in (
+        (off, time_of_pull_off, "pull-off", "last " * of_some),
+        (on, time_of_jump_in, "jump-in", "first " * (of_some or on.size > 1)),
+    ):
+        marks = []
+        for record in records[is_shown[records]]:
+            part = known & closed & (stretches == stretches[record])
+            time = time_of(dataset, int(record))
+            if np.isnan(time) or not part.any():
+                continue
+            # what is prescribed goes on between the records, anything else may jump
+            is_sure = np.isfinite(places) if scene.over in _PRESCRIBED else part
+            x = np.interp(time, clock[is_sure], places[is_sure])
+            marks.append((x, np.interp(time, clock[part], mean[part])))
+        if marks:
+            look = SIGNS[sign] | {"color": line.colour, "label": words + sign}
+            panel.plot(*np.transpose(marks), **look)
 
 
 #: Names of the branches of a course of the speed.

@@ -197,4 +197,4 @@ def test_a_loop_is_what_fits_a_sphere_that_moves_with_load_and_radius_over_the_i
         "load $P$ (µN)",
         r"base $\Delta$ (µm)",
     ]
-    assert {"pull-off", "jump-in"} <= set(legend_of(radii)[0])
+    assert {"pull-off", "first jump-in"} <= set(legend_of(radii)[0])
