@@ -39,6 +39,9 @@ _MOST = 10
 #: Variables that are zero while the contact is open: lines break there.
 _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
 
+#: Name of the inner band of a curve, or of its bars.
+_ERROR = "± standard error"
+
 #: Markers that stand for line styles where points are not joined.
 _MARKS = {"-": "o", "--": "s", "-.": "^", ":": "v"}
 
@@ -120,6 +123,11 @@ class Scene(NamedTuple):
     @property
     def single(self) -> bool:
         return len(self.lines) == 1
+
+    @property
+    def bands(self) -> tuple[str, str]:
+        """Names of the outer and the inner band of a curve."""
+        return self.spread, _ERROR
 
     @property
     def over_time(self) -> bool:
@@ -276,9 +284,11 @@ def curve(panel: Axes, scene: Scene, name: str, line: Line, factor: float) -> No
     label = line.label if np.any(np.isfinite(mean)) else ""
     panel.plot(x, mean, color=colour, label=label, **scene.look(line.style))
     if np.any(sem > 0.0) and scene.over_time:
-        style.fill(panel, x, mean - sem, mean + sem, color=colour, alpha=0.45)
+        inner: Any = {"color": colour, "alpha": 0.45, "label": _ERROR}
+        style.fill(panel, x, mean - sem, mean + sem, **inner)
     elif np.any(sem > 0.0):
         bars: Any = {"fmt": "none", "ecolor": colour, "elinewidth": 0.8, "capsize": 1.5}
+        bars["label"] = _ERROR
         panel.errorbar(x, mean, np.nan_to_num(sem), **bars)
 
 
@@ -574,7 +584,6 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
             label = r"intact bonds, $\Delta\gamma(N)$"
             look: Any = scene.look("-.") | {"color": style.BONDS, "label": label}
             panel.plot(*scene.parted(scene.lines[0], intact), **look)
-    bare = scene._replace(spread="")
     for name in shown:
         text, colour, dashes = _ENERGIES[name]
         colour = colour if scene.single else style.REFERENCE
@@ -582,11 +591,11 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
         for line in scene.lines[: 1 if is_one else None]:
             shade = colour if is_one else line.colour
             plain = line._replace(label="", style=dashes, colour=shade)
-            curve(panel, bare, name, plain, factor)
+            curve(panel, scene, name, plain, factor)
         panel.plot([], [], color=colour, label=text, **scene.look(dashes))
     if np.any(values <= 0.0):
         panel.axhline(0.0, **style.GUIDE)
-    style.legend(panel)
+    style.legend(panel, without=scene.bands)
 
 
 def share_panel(panel: Axes, scene: Scene) -> None:
@@ -638,7 +647,7 @@ def stacked(
         drawing(panel, scene)
     if scene.measured and compared:
         scene.measured.residual_panel(axes[-1], scene.over)
-    style.legend(axes[0], scene.title)
+    style.legend(axes[0], scene.title, further=_bands(axes[1:], scene))
     is_marked = scene.measured or "marker" in scene.look("-")
     room = 0.03 if is_marked else 0.0
     style.across(axes[-1], scene.reach, scene.words, scene.scale, room)
@@ -648,6 +657,16 @@ def stacked(
     if scene.measured:
         scene.measured.finish(figure, scene.over, ax)
     return figure, axes
+
+
+def _bands(axes: Sequence[Axes], scene: Scene) -> dict[str, Any]:
+    """Return a band of each kind in some panels by its name, because the first panel may have none."""
+    result: dict[str, Any] = {}
+    for panel in axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            if label in scene.bands:
+                result.setdefault(label, handle)
+    return result
 
 
 def further_panels(scene: Scene) -> list[tuple[float, Panel]]:

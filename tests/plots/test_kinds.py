@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from helpers.parts import (
+    Adhesion,
     Bell,
     Clock,
     Ensemble,
@@ -546,3 +547,30 @@ def test_a_band_of_few_members_is_named_as_interpolated_between_them():
     ):
         figure = plots.draw(simulated(ensemble=Ensemble(members=members)))
         assert name in legend_of(figure.axes[0])[0]
+
+
+@pytest.mark.parametrize("share", [1.0, 0.0])
+def test_each_band_is_named_once_also_if_only_a_lower_panel_has_it(share):
+    counted = bonds.Counted(
+        critical_speed=1e-2, rebinding_rate=500.0, sites=200, stress=1e5
+    )
+    dataset = simulated(
+        bonds=counted,
+        shear=shear.Uniform(),
+        adhesion=Adhesion(work=42e-3, bond_share=share),
+        ensemble=Ensemble(members=20),
+    )
+    figure = plots.draw(dataset, "curve", Choices(absolute=True))
+    # without a share of the bonds in the adhesion the areas of all members agree
+    radius = dataset["contact_radius"].std("member").max()
+    assert (radius > 1e-9) == (share > 0.0)
+    legends = [*figure.legends, *(panel.get_legend() for panel in figure.axes)]
+    names = [text.get_text() for each in filter(None, legends) for text in each.texts]
+    for band in ("5–95 % of members", "± standard error"):
+        assert names.count(band) == 1
+
+
+def test_a_single_member_has_no_band_in_its_legend():
+    dataset = simulated(ensemble=Ensemble(members=1), shear=shear.Uniform())
+    names = legend_of(plots.draw(dataset, "time").axes[0])[0]
+    assert not any("%" in name or "error" in name for name in names)
