@@ -36,8 +36,14 @@ _MARKED = 25
 #: Largest number of curves of a panel.
 _MOST = 10
 
-#: Variables that are zero while the contact is open: lines break there.
-_OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
+#: Variables that only a closed contact has: lines break where it is open.
+_OF_CONTACT = (
+    "contact_radius",
+    "contact_area",
+    "area_ratio",
+    "friction_force",
+    "shear_stress",
+)
 
 #: Name of the inner band of a curve, or of its bars.
 _ERROR = "± standard error"
@@ -187,6 +193,9 @@ class Scene(NamedTuple):
             return np.full(points, np.nan)
         values = known.isel(line.point, missing_dims="ignore").to_numpy()
         shown = np.full(points, True) if line.shown is None else line.shown
+        if name == "shear_stress":
+            # it is recorded of open contacts, too, on which no stress acts
+            shown = shown & ~self.opened(line)
         return np.where(shown, values, np.nan)
 
     def all(self, *names: str) -> Array:
@@ -206,7 +215,8 @@ class Scene(NamedTuple):
         low, high = mean - spread, mean + spread
         if (quantiles := self.statistics.get(name, "quantile")) is not None:
             ends = quantiles.isel(line.point).transpose("quantile", ...).to_numpy()
-            low, high = ends[0], ends[-1]
+            # a branch has only its own part of the band
+            low, high = np.where(np.isfinite(mean), ends[[0, -1]], np.nan)
         return [mean, error, low, high]
 
     def parted(self, line: Line, *along: Array) -> list[Array]:
@@ -344,7 +354,11 @@ def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float) 
                 continue
             # what is prescribed goes on between the records, anything else may jump
             is_sure = np.isfinite(places) if scene.over in _PRESCRIBED else part
-            x = np.interp(time, clock[is_sure], places[is_sure])
+            # between records along the drawn axis, as a ramp is on it
+            axis, back = (
+                (np.log, np.exp) if scene.scale == "log" else (np.array, np.array)
+            )
+            x = back(np.interp(time, clock[is_sure], axis(places[is_sure])))
             marks.append((x, np.interp(time, clock[part], mean[part])))
         if marks:
             look = SIGNS[sign] | {"color": line.colour, "label": words + sign}

@@ -19,6 +19,7 @@ from helpers.parts import (
     shear,
 )
 from helpers.pictured import (
+    RAMP,
     STEADY,
     drawn,
     legend_of,
@@ -313,14 +314,13 @@ def test_of_members_that_come_off_at_different_times_the_closed_ones_are_drawn_b
         plots.draw(dataset, "curve", Choices(absolute=True))
     ).axes
     mean = 1e6 * read.over_members(dataset, ["contact_area"])["contact_area"].value
-    speed, area = drawn(radius, pictures.BOTH)
+    _, area = drawn(radius, pictures.BOTH)
     assert_allclose(area, np.where(count > 2, mean, np.nan), rtol=1e-12)
     (cross,) = (line.get_xydata() for line in radius.lines if line.get_marker() == "x")
     last = np.flatnonzero(count > 2)[-1]
-    # the ramp is linear between its records, as a closed form of the speed at the time is not recorded
-    pulled = dataset["pull_off_time"].max()
-    at = np.interp(pulled, dataset["t"], speed)
-    assert_allclose(cross, [[at, area[last]]], rtol=1e-14)
+    pulled = dataset["pull_off_time"].max() / dataset["t"][-1]
+    at = 1e3 * RAMP.start * (RAMP.stop / RAMP.start) ** pulled
+    assert_allclose(cross, [[at, area[last]]], rtol=1e-12)
     assert "last pull-off" in legend_of(radius)[0]
     assert opened.get_ylabel() == "open contacts"
     assert_allclose(
@@ -574,3 +574,26 @@ def test_a_single_member_has_no_band_in_its_legend():
     dataset = simulated(ensemble=Ensemble(members=1), shear=shear.Uniform())
     names = legend_of(plots.draw(dataset, "time").axes[0])[0]
     assert not any("%" in name or "error" in name for name in names)
+
+
+def test_each_branch_of_a_course_has_the_band_of_its_own_records():
+    course = drive.Table(time=(0.0, 0.2, 0.4), speed=(1e-4, 1e-2, 1e-4))
+    counted = bonds.Counted(
+        critical_speed=1e-3, rebinding_rate=50.0, sites=200, stress=1e5
+    )
+    parts = {"drive": course, "bonds": counted, "shear": shear.Uniform()}
+    dataset = simulated(ensemble=Ensemble(members=20), **parts)
+    panel = plots.draw(dataset, "curve").axes[0]
+    ratio = read.over_members(dataset, ["area_ratio"])["area_ratio"]
+    low, high = ratio.quantile.isel(quantile=[0, -1]).transpose("quantile", "t")
+    turn = int(np.argmax(dataset["speed"].to_numpy()))
+    halves = slice(None, turn + 1), slice(turn, None)
+    heights = {}
+    for band in panel.collections:
+        if "members" in str(band.get_label()):
+            colour = tuple(band.get_facecolor()[0])
+            for path in band.get_paths():
+                heights.setdefault(colour, []).extend(path.vertices[:, 1])
+    for edges, half in zip(heights.values(), halves, strict=True):
+        ends = [np.min(low[half]), np.max(high[half])]
+        assert_allclose([min(edges), max(edges)], ends, rtol=1e-12)
