@@ -25,7 +25,7 @@ from sim.read.dataset import (
     stays_held,
 )
 from sim.read.estimate import Estimate, Estimates
-from sim.read.events import jumps
+from sim.read.events import jumps, time_of_jump_in, time_of_pull_off
 from sim.read.late import distribution
 from sim.read.over_speed import speed_dim
 from sim.read.statistics import FOR_TAILS, averaging, over_members, with_a_value
@@ -36,8 +36,17 @@ _MARKED = 25
 #: Largest number of curves of a panel.
 _MOST = 10
 
-#: Variables that are zero while the contact is open: lines break there.
-_OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
+#: Variables that only a closed contact has: lines break where it is open.
+_OF_CONTACT = (
+    "contact_radius",
+    "contact_area",
+    "area_ratio",
+    "friction_force",
+    "shear_stress",
+)
+
+#: Name of the inner band of a curve, or of its bars.
+_ERROR = "± standard error"
 
 #: Markers that stand for line styles where points are not joined.
 _MARKS = {"-": "o", "--": "s", "-.": "^", ":": "v"}
@@ -47,6 +56,9 @@ SIGNS: Any = {
     "pull-off": {"marker": "x", "markersize": 4, "linestyle": "none", "zorder": 3},
     "jump-in": style.HOLLOW | {"mew": 0.8, "zorder": 3},
 }
+
+#: Variables of an x axis that go on while a contact opens or closes.
+_PRESCRIBED = "t", "speed", "stage_speed", "displacement"
 
 
 class Statistics:
@@ -119,6 +131,11 @@ class Scene(NamedTuple):
         return len(self.lines) == 1
 
     @property
+    def bands(self) -> tuple[str, str]:
+        """Names of the outer and the inner band of a curve."""
+        return self.spread, _ERROR
+
+    @property
     def over_time(self) -> bool:
         return self.statistics.along == "t"
 
@@ -176,6 +193,9 @@ class Scene(NamedTuple):
             return np.full(points, np.nan)
         values = known.isel(line.point, missing_dims="ignore").to_numpy()
         shown = np.full(points, True) if line.shown is None else line.shown
+        if name == "shear_stress":
+            # it is recorded of open contacts, too, on which no stress acts
+            shown = shown & ~self.opened(line)
         return np.where(shown, values, np.nan)
 
     def all(self, *names: str) -> Array:
@@ -195,7 +215,8 @@ class Scene(NamedTuple):
         low, high = mean - spread, mean + spread
         if (quantiles := self.statistics.get(name, "quantile")) is not None:
             ends = quantiles.isel(line.point).transpose("quantile", ...).to_numpy()
-            low, high = ends[0], ends[-1]
+            # a branch has only its own part of the band
+            low, high = np.where(np.isfinite(mean), ends[[0, -1]], np.nan)
         return [mean, error, low, high]
 
     def parted(self, line: Line, *along: Array) -> list[Array]:
@@ -273,14 +294,16 @@ def curve(panel: Axes, scene: Scene, name: str, line: Line, factor: float) -> No
     label = line.label if np.any(np.isfinite(mean)) else ""
     panel.plot(x, mean, color=colour, label=label, **scene.look(line.style))
     if np.any(sem > 0.0) and scene.over_time:
-        style.fill(panel, x, mean - sem, mean + sem, color=colour, alpha=0.45)
+        inner: Any = {"color": colour, "alpha": 0.45, "label": _ERROR}
+        style.fill(panel, x, mean - sem, mean + sem, **inner)
     elif np.any(sem > 0.0):
         bars: Any = {"fmt": "none", "ecolor": colour, "elinewidth": 0.8, "capsize": 1.5}
+        bars["label"] = _ERROR
         panel.errorbar(x, mean, np.nan_to_num(sem), **bars)
 
 
 def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
-    """Draw the curves of a contact: a cross at each pull-off of the last member in contact, a ring at each jump-in."""
+    """Draw the curves of a contact: a cross at each pull-off of the last member in contact, a ring at a jump-in."""
     for line in scene.lines:
         curve(panel, scene, name, line, factor)
         if name in _OF_CONTACT:
@@ -306,14 +329,40 @@ def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
 
 
 def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float) -> None:
-    """Draw a cross at each pull-off and a ring at each jump-in of a curve, at the ends of its parts."""
-    x, mean = scene.x[line.number], factor * scene.values(name, line)
-    known, (off, on) = np.flatnonzero(np.isfinite(mean)), scene.openings(line)
-    places = np.searchsorted(known, off, "right") - 1, np.searchsorted(known, on)
-    for (words, sign), place in zip(SIGNS.items(), places, strict=True):
-        if place.size and known.size:
-            at = known.take(place, mode="clip")
-            panel.plot(x[at], mean[at], color=line.colour, label=words, **sign)
+    """Draw a cross at each pull-off and a ring at the first jump-in of a curve, at their recorded times.
+
+    Between records the height is that of the nearest end of the curve, because none is recorded at the jump. A pull-off
+    or a jump-in without a recorded time has no mark.
+    """
+    dataset, mean = scene.statistics.dataset, factor * scene.values(name, line)
+    dataset = dataset.isel(line.point, missing_dims="ignore")
+    clock, known = dataset["t"].to_numpy(), np.isfinite(mean)
+    places, closed = scene.x[line.number], ~scene.opened(line)
+    is_shown = np.full(clock.size, True) if line.shown is None else line.shown
+    stretches = np.cumsum(np.append(False, np.diff(closed.astype(int)) > 0))
+    of_some = MEMBERS in dataset.dims
+    off, on = scene.openings(line)
+    for records, time_of, sign, words in (
+        (off, time_of_pull_off, "pull-off", "last " * of_some),
+        (on, time_of_jump_in, "jump-in", "first " * (of_some or on.size > 1)),
+    ):
+        marks = []
+        for record in records[is_shown[records]]:
+            part = known & closed & (stretches == stretches[record])
+            time = time_of(dataset, int(record))
+            if np.isnan(time) or not part.any():
+                continue
+            # what is prescribed goes on between the records, anything else may jump
+            is_sure = np.isfinite(places) if scene.over in _PRESCRIBED else part
+            # between records along the drawn axis, as a ramp is on it
+            axis, back = (
+                (np.log, np.exp) if scene.scale == "log" else (np.array, np.array)
+            )
+            x = back(np.interp(time, clock[is_sure], axis(places[is_sure])))
+            marks.append((x, np.interp(time, clock[part], mean[part])))
+        if marks:
+            look = SIGNS[sign] | {"color": line.colour, "label": words + sign}
+            panel.plot(*np.transpose(marks), **look)
 
 
 #: Names of the branches of a course of the speed.
@@ -549,7 +598,6 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
             label = r"intact bonds, $\Delta\gamma(N)$"
             look: Any = scene.look("-.") | {"color": style.BONDS, "label": label}
             panel.plot(*scene.parted(scene.lines[0], intact), **look)
-    bare = scene._replace(spread="")
     for name in shown:
         text, colour, dashes = _ENERGIES[name]
         colour = colour if scene.single else style.REFERENCE
@@ -557,11 +605,11 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
         for line in scene.lines[: 1 if is_one else None]:
             shade = colour if is_one else line.colour
             plain = line._replace(label="", style=dashes, colour=shade)
-            curve(panel, bare, name, plain, factor)
+            curve(panel, scene, name, plain, factor)
         panel.plot([], [], color=colour, label=text, **scene.look(dashes))
     if np.any(values <= 0.0):
         panel.axhline(0.0, **style.GUIDE)
-    style.legend(panel)
+    style.legend(panel, without=scene.bands)
 
 
 def share_panel(panel: Axes, scene: Scene) -> None:
@@ -613,7 +661,7 @@ def stacked(
         drawing(panel, scene)
     if scene.measured and compared:
         scene.measured.residual_panel(axes[-1], scene.over)
-    style.legend(axes[0], scene.title)
+    style.legend(axes[0], scene.title, further=_bands(axes[1:], scene))
     is_marked = scene.measured or "marker" in scene.look("-")
     room = 0.03 if is_marked else 0.0
     style.across(axes[-1], scene.reach, scene.words, scene.scale, room)
@@ -623,6 +671,16 @@ def stacked(
     if scene.measured:
         scene.measured.finish(figure, scene.over, ax)
     return figure, axes
+
+
+def _bands(axes: Sequence[Axes], scene: Scene) -> dict[str, Any]:
+    """Return a band of each kind in some panels by its name, because the first panel may have none."""
+    result: dict[str, Any] = {}
+    for panel in axes:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            if label in scene.bands:
+                result.setdefault(label, handle)
+    return result
 
 
 def further_panels(scene: Scene) -> list[tuple[float, Panel]]:

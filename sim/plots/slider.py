@@ -475,7 +475,10 @@ def _mark_peak(panel: Axes, scene: Scene, line: Line, factor: float, over: str) 
         .ravel()
         for each in stated
     )
-    sign = np.sign(scene.values("shear_stress", line.whole)[-1])
+    stress = scene.values("shear_stress", line.whole)
+    sign = np.sign(stress[np.isfinite(stress)][-1:])
+    if not sign.size:
+        return line
     at = scene.unit.factor * place, factor * sign * peak
     if not np.isfinite(place).any():
         return line

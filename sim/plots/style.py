@@ -8,7 +8,9 @@ import io
 import itertools
 import re
 import string
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import matplotlib as mpl
@@ -280,16 +282,26 @@ def axis_scale(values: np.ndarray) -> str:
     return "symlog" if is_near_zero else "linear"
 
 
-def legend(panel: Axes, title: str = "", whole: bool = False) -> None:
+def legend(
+    panel: Axes,
+    title: str = "",
+    whole: bool = False,
+    without: Collection[str] = (),
+    further: Mapping[str, Any] = MappingProxyType({}),
+) -> None:
     """Draw a legend above a panel, each label once and none of a line without a point.
+
+    Labels ``without`` are left out, and ``further`` ones of other panels are added.
 
     That of a ``whole`` figure, or of the first of panels in a column, belongs to the
     figure, so that a title of the panel has its place below it.
     """
     entries: dict[str, Any] = {}
     for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
-        if _is_drawn(handle, panel.get_yscale() == "log"):
+        is_drawn = _is_drawn(handle, panel.get_yscale() == "log")
+        if is_drawn and label not in without:
             entries.setdefault(label, handle)
+    entries = {**further, **entries}
     if not entries and not title:
         return
     figure, spec = cast(Figure, panel.figure), panel.get_subplotspec()

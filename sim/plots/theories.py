@@ -317,7 +317,9 @@ def _events(panel: Axes, scene: Scene, line: Line, force: float) -> np.ndarray:
         known = np.isfinite(load)
         if known.any():
             x = scene.unit.factor * place[known]
-            look = sign | {"color": line.colour, "label": words}
+            is_one = event == "pull_off" or scene.openings(line)[1].size <= 1
+            label = words if is_one else f"first {words}"
+            look = sign | {"color": line.colour, "label": label}
             panel.plot(x, force * load[known], **look)
             reached.append(x)
     return np.concatenate(reached) if reached else np.empty(0)

@@ -261,6 +261,49 @@ def jumps(speed: Array, turns: bool = False) -> Array:
     return np.flatnonzero(np.pad(jumped, (0, change.size - jumped.size)) | turned) + 1
 
 
+def time_of_pull_off(dataset: xr.Dataset, record: int) -> float:
+    """Return the time of the pull-off after a record at which a contact was last closed [s].
+
+    Of several members it is that of the last one to open. It is the recorded ``pull_off_time`` if each detachment of
+    the member has one, else the end of the clock step in which the contact opened. It is nan if neither is recorded, or
+    only their statistics over members.
+    """
+    if only_statistics(dataset):
+        return np.nan
+    name = "detachment_time" if "detachment_time" in dataset else "first_detachment"
+    if name not in dataset:
+        return np.nan
+    opened = np.ravel(dataset[name].isel(t=record + 1, missing_dims="ignore"))
+    before, after = dataset["t"].to_numpy()[record : record + 2]
+    is_between = (opened > before) & (opened <= after)
+    if not is_between.any():
+        return np.nan
+    member = int(np.where(is_between, opened, -np.inf).argmax())
+    time = float(opened[member])
+    if not {"pull_off_time", "detachments"} <= {*dataset.variables}:
+        return time
+    count = np.ravel(dataset["detachments"])[member]
+    each = pull_offs(dataset)["pull_off_time"].to_numpy().reshape(opened.size, -1)
+    known = each[member][np.isfinite(each[member])]
+    if known.size != count:
+        return time
+    return float(np.max(known, initial=-np.inf, where=known <= time))
+
+
+def time_of_jump_in(dataset: xr.Dataset, record: int) -> float:
+    """Return the time of the first jump into contact if a contact is closed again at a record, by this jump [s].
+
+    Of several members it is that of the first one to close. It is nan for a later jump, whose time is not recorded, for
+    a contact that closes without a jump, or if only statistics over members are recorded.
+    """
+    if only_statistics(dataset) or "jump_in_time" not in dataset:
+        return np.nan
+    before, after = dataset["t"].to_numpy()[record - 1 : record + 1]
+    times = np.ravel(dataset["jump_in_time"])
+    times = times[(times > before) & (times <= after)]
+    return float(np.min(times)) if times.size else np.nan
+
+
 def incipient_law(force: Array, area: Array) -> tuple[int, float]:
     """Return the record of the largest force [N] before its first fall by 2 %, and alpha of A0 - alpha Q^2 [m^2/N^2].
 

@@ -6,10 +6,12 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from helpers.parts import (
+    Adhesion,
     Bell,
     Clock,
     Ensemble,
     Equilibrium,
+    RateDependent,
     Record,
     bonds,
     drive,
@@ -17,6 +19,7 @@ from helpers.parts import (
     shear,
 )
 from helpers.pictured import (
+    RAMP,
     STEADY,
     drawn,
     legend_of,
@@ -266,8 +269,9 @@ def test_curves_show_means_over_speed_and_break_where_the_contact_is_open_or_the
     _, radius = drawn(panel, pictures.BOTH)
     np.testing.assert_array_equal(np.isfinite(radius), closed)
     (cross,) = (line.get_data() for line in panel.lines if line.get_marker() == "x")
-    at = [1e3 * dataset["t"][last], 1e6 * dataset["contact_radius"][last]]
+    at = [1e3 * dataset["pull_off_time"], 1e6 * dataset["contact_radius"][last]]
     assert_allclose(np.ravel(cross), at, rtol=1e-14)
+    assert dataset["t"][last] < dataset["pull_off_time"] < dataset["t"][last + 1]
     assert "pull-off" in legend_of(panel)[0] and "Hertz" not in legend_of(panel)[0]
     loads = [-3.9e-4, -2e-4, 0.0, 1e-3, 4e-3]
     dataset = simulated(
@@ -310,15 +314,66 @@ def test_of_members_that_come_off_at_different_times_the_closed_ones_are_drawn_b
         plots.draw(dataset, "curve", Choices(absolute=True))
     ).axes
     mean = 1e6 * read.over_members(dataset, ["contact_area"])["contact_area"].value
-    speed, area = drawn(radius, pictures.BOTH)
+    _, area = drawn(radius, pictures.BOTH)
     assert_allclose(area, np.where(count > 2, mean, np.nan), rtol=1e-12)
     (cross,) = (line.get_xydata() for line in radius.lines if line.get_marker() == "x")
     last = np.flatnonzero(count > 2)[-1]
-    assert_allclose(cross, [[speed[last], area[last]]], rtol=1e-14)
+    pulled = dataset["pull_off_time"].max() / dataset["t"][-1]
+    at = 1e3 * RAMP.start * (RAMP.stop / RAMP.start) ** pulled
+    assert_allclose(cross, [[at, area[last]]], rtol=1e-12)
+    assert "last pull-off" in legend_of(radius)[0]
     assert opened.get_ylabel() == "open contacts"
     assert_allclose(
         drawn(opened, pictures.BOTH)[1], 1.0 - count / 8, rtol=0, atol=1e-15
     )
+
+
+BACK = {"from": 2e-6, "to": -14e-6, "cycles": 2}
+BEHIND_A_SPRING = Equilibrium(
+    displacement=BACK, stiffness=340.0, after_pull_off="reattach"
+)
+LAGGING = RateDependent(
+    indentation=BACK,
+    front_speed=1e-3,
+    front_exponent=0.6,
+    heal_speed=1e-4,
+    after_pull_off="reattach",
+)
+
+
+@pytest.mark.parametrize("contact", [BEHIND_A_SPRING, LAGGING])
+@pytest.mark.parametrize("record", [2e-3, 0.06])
+def test_pull_offs_and_the_first_jump_in_are_marked_at_their_times_between_records(
+    contact, record
+):
+    clock = Clock(duration=1.8, step=2e-3, record=record)
+    parts = {"shear": shear.Uniform(), "bonds": bonds.Unbroken(), "drive": STEADY}
+    dataset = simulated(contact=contact, clock=clock, **parts)
+    panel = plots.draw(dataset, "time").axes[0]
+    marks = {
+        line.get_label(): line.get_xdata()
+        for line in panel.lines
+        if line.get_marker() in ("x", "o")
+    }
+    pulled = dataset["phase_pull_off_time"].to_numpy()
+    assert np.isfinite(pulled).sum() == 2
+    expected = {"pull-off": pulled[np.isfinite(pulled)]}
+    if "jump_in_time" in dataset:  # a lagging edge closes without a jump
+        expected["first jump-in"] = dataset["jump_in_time"]
+    assert marks.keys() == expected.keys()
+    for words, times in expected.items():
+        assert_allclose(marks[words], 1.0 * np.ravel(times), rtol=1e-14)
+
+
+def test_of_members_known_by_their_statistics_alone_no_pull_off_is_marked():
+    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=200)
+    parts = {"contact": Equilibrium(load=-3e-4), "bonds": counted}
+    dataset = simulated(
+        ensemble=Ensemble(members=8), record=Record(per_member=False), **parts
+    )
+    assert dataset["in_contact"].isel(t=-1, statistic=0) == 0.0
+    panel = plots.draw(dataset, "time").axes[0]
+    assert all(line.get_marker() != "x" for line in panel.lines)
 
 
 def test_branches_of_a_course_are_apart_and_shuffled_speeds_make_the_same_curves():
@@ -492,3 +547,53 @@ def test_a_band_of_few_members_is_named_as_interpolated_between_them():
     ):
         figure = plots.draw(simulated(ensemble=Ensemble(members=members)))
         assert name in legend_of(figure.axes[0])[0]
+
+
+@pytest.mark.parametrize("share", [1.0, 0.0])
+def test_each_band_is_named_once_also_if_only_a_lower_panel_has_it(share):
+    counted = bonds.Counted(
+        critical_speed=1e-2, rebinding_rate=500.0, sites=200, stress=1e5
+    )
+    dataset = simulated(
+        bonds=counted,
+        shear=shear.Uniform(),
+        adhesion=Adhesion(work=42e-3, bond_share=share),
+        ensemble=Ensemble(members=20),
+    )
+    figure = plots.draw(dataset, "curve", Choices(absolute=True))
+    # without a share of the bonds in the adhesion the areas of all members agree
+    radius = dataset["contact_radius"].std("member").max()
+    assert (radius > 1e-9) == (share > 0.0)
+    legends = [*figure.legends, *(panel.get_legend() for panel in figure.axes)]
+    names = [text.get_text() for each in filter(None, legends) for text in each.texts]
+    for band in ("5–95 % of members", "± standard error"):
+        assert names.count(band) == 1
+
+
+def test_a_single_member_has_no_band_in_its_legend():
+    dataset = simulated(ensemble=Ensemble(members=1), shear=shear.Uniform())
+    names = legend_of(plots.draw(dataset, "time").axes[0])[0]
+    assert not any("%" in name or "error" in name for name in names)
+
+
+def test_each_branch_of_a_course_has_the_band_of_its_own_records():
+    course = drive.Table(time=(0.0, 0.2, 0.4), speed=(1e-4, 1e-2, 1e-4))
+    counted = bonds.Counted(
+        critical_speed=1e-3, rebinding_rate=50.0, sites=200, stress=1e5
+    )
+    parts = {"drive": course, "bonds": counted, "shear": shear.Uniform()}
+    dataset = simulated(ensemble=Ensemble(members=20), **parts)
+    panel = plots.draw(dataset, "curve").axes[0]
+    ratio = read.over_members(dataset, ["area_ratio"])["area_ratio"]
+    low, high = ratio.quantile.isel(quantile=[0, -1]).transpose("quantile", "t")
+    turn = int(np.argmax(dataset["speed"].to_numpy()))
+    halves = slice(None, turn + 1), slice(turn, None)
+    heights = {}
+    for band in panel.collections:
+        if "members" in str(band.get_label()):
+            colour = tuple(band.get_facecolor()[0])
+            for path in band.get_paths():
+                heights.setdefault(colour, []).extend(path.vertices[:, 1])
+    for edges, half in zip(heights.values(), halves, strict=True):
+        ends = [np.min(low[half]), np.max(high[half])]
+        assert_allclose([min(edges), max(edges)], ends, rtol=1e-12)

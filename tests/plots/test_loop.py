@@ -197,4 +197,10 @@ def test_a_loop_is_what_fits_a_sphere_that_moves_with_load_and_radius_over_the_i
         "load $P$ (µN)",
         r"base $\Delta$ (µm)",
     ]
-    assert {"pull-off", "jump-in"} <= set(legend_of(radii)[0])
+    assert {"pull-off", "first jump-in"} <= set(legend_of(radii)[0])
+
+
+def test_of_several_cycles_the_ring_is_named_as_the_first_jump_in(grips):
+    assert "first jump-in" in legend_of(plots.draw(grips, "loop").axes[0])[0]
+    once = Equilibrium(indentation=BACK | {"cycles": 1}, after_pull_off="reattach")
+    assert "jump-in" in legend_of(plots.draw(moved(once), "loop").axes[0])[0]

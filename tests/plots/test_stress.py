@@ -213,3 +213,13 @@ def test_sliding_without_a_stress_over_speed_or_time_is_refused_with_the_cure():
     ):
         with pytest.raises(ValueError, match=cure):
             plots.draw(ramped(**changes, clock=short), "stress")
+
+
+def test_no_stress_is_drawn_of_a_contact_that_is_open():
+    dataset = started(sweep={"contact.load": [-3.5e-4, 4e-3]})
+    is_open = dataset["in_contact"].isel(t=-1) == 0
+    assert is_open.to_numpy().tolist() == [True, False]
+    panel = plots.draw(dataset).axes[0]
+    assert legend_of(panel)[0] == ["$P$ = 4 mN"]
+    lines = [line.get_ydata() for line in panel.lines if line.get_linestyle() == "-"]
+    assert [bool(np.any(np.isfinite(line))) for line in lines] == [False, True]
