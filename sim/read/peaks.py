@@ -29,6 +29,8 @@ from sim.units.notation import engineering
 _ROUNDING = 1e-6
 #: Clock steps after a start from rest in which the friction of stretched bonds has risen too fast to show its peak.
 _TOO_FAST = 1.5
+#: Lives of a bond in steady sliding above which a clock step shows no peak of the friction after a rest.
+_SHOWN = 0.5
 UNRESOLVED = (
     "the friction rises within a clock step, which may hide a peak; reduce clock.step"
 )
@@ -142,10 +144,46 @@ def peaks(dataset: xr.Dataset) -> Estimates:
     return result
 
 
+def _after_rests(dataset: xr.Dataset) -> xr.DataArray:
+    """Return True where a prescribed speed follows a rest."""
+    drive = word(dataset, "drive.model", "")
+    return (drive == "holds") | (drive == "start")
+
+
 def _rises_unseen(dataset: xr.Dataset, since: xr.DataArray) -> xr.DataArray:
-    """Return True if a maximum is so soon after a rest [s] that the clock step does not show how the friction rises."""
+    """Return True if the clock step does not show how friction rises to a maximum so soon after a rest [s].
+
+    That is so if the maximum comes within the first steps, or if bonds live for less than two steps of sliding: then
+    the peak may be past before the first step ends, and another maximum may follow.
+    """
     stretched = _number_of(dataset, "bonds.bond_stiffness", 0.0) > 0.0
-    return stretched & (since < _TOO_FAST * setting(dataset, "clock.step"))
+    step = setting(dataset, "clock.step")
+    return stretched & ((since < _TOO_FAST * step) | (step > _SHOWN * _life(dataset)))
+
+
+def _life(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the mean life of a bond at the last record of sliding [s]; nan if unknown.
+
+    As many form there as break. Bonds are taken to break rarely at rest, where they are the unit of their number.
+    """
+    if not {"bond_fraction", "speed"} <= {*dataset.variables}:
+        return xr.DataArray(math.nan)
+
+    def mean(name: str) -> xr.DataArray:
+        values = ensemble_mean(abs(dataset[name].astype(float)))
+        return values.mean(MEMBERS) if MEMBERS in values.dims else values
+
+    last = (
+        dataset.sizes["t"]
+        - 1
+        - (mean("speed") > 0.0)[{"t": slice(None, None, -1)}].argmax("t")
+    )
+    bound = mean("bond_fraction").isel(t=last, missing_dims="ignore")
+    rate = _number_of(dataset, "bonds.rebinding_rate", math.nan)
+    rate = _number_of(dataset, "bonds.rebinding_rate_at_temperature", math.nan).fillna(
+        rate
+    )
+    return (bound / ((1.0 - bound) * rate)).drop_vars("t", errors="ignore")
 
 
 def _number_of(dataset: xr.Dataset, key: str, default: float) -> xr.DataArray:
@@ -217,13 +255,11 @@ def static_threshold(dataset: xr.Dataset) -> Estimates:
             "static_threshold_area",
         )
     )
-    starts = word(dataset, "drive.model", "") == "start"
-    if bool(starts.any()) and "phase_start" in dataset:
+    prescribed = _after_rests(dataset)
+    if bool(prescribed.any()) and "phase_start" in dataset:
         begins = dataset["phase_start"]
-        sliding = begins.isel(phase=begins.count("phase") - 1).drop_vars(
-            "phase", errors="ignore"
-        )
-        is_hidden = starts & _rises_unseen(dataset, when - sliding)
+        since = when - begins.where(begins <= when).max("phase")
+        is_hidden = prescribed & _rises_unseen(dataset, since)
         force, when, area = (each.where(~is_hidden) for each in (force, when, area))
     at_rest = math.pi * dataset["radius_at_rest"] ** 2
     about = f"contact area at the {text} over that of JKR theory at rest"
@@ -258,8 +294,7 @@ def peaks_after_holds(dataset: xr.Dataset) -> xr.Dataset:
     """
     if "phase_static_threshold" not in dataset:
         return xr.Dataset()
-    start, rests = dataset["phase_start"], dataset["phase_name"].str.contains("rest")
-    held = (dataset["phase_end"] - start).where(rests).shift(phase=1)
+    start, held = dataset["phase_start"], _held(dataset)
     peak = dataset["phase_static_threshold"].astype(float)
     is_known = held.notnull() & ~hidden_after_holds(dataset)
     result = xr.Dataset(
@@ -276,15 +311,20 @@ def peaks_after_holds(dataset: xr.Dataset) -> xr.Dataset:
     return result.transpose(..., "phase")
 
 
+def _held(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the time at rest before each phase [s], nan without."""
+    rests = dataset["phase_name"].str.contains("rest")
+    return (dataset["phase_end"] - dataset["phase_start"]).where(rests).shift(phase=1)
+
+
 def hidden_after_holds(dataset: xr.Dataset) -> xr.DataArray:
-    """Return True for the phases of prescribed speed in which a clock step may hide the peak of friction.
+    """Return True for the phases after a hold in which a clock step may hide the peak of friction.
 
     A spring shows it, because the slider behind it moves in sub-steps.
     """
-    drive = word(dataset, "drive.model", "")
-    is_prescribed = (drive == "holds") | (drive == "start")
     since = dataset["phase_static_threshold_time"] - dataset["phase_start"]
-    return is_prescribed & _rises_unseen(dataset, since)
+    is_after = _after_rests(dataset) & _held(dataset).notnull()
+    return is_after & _rises_unseen(dataset, since)
 
 
 #: Decades of the time held from which on ageing is judged, and the share of the growth in the first of them above which

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,6 +40,20 @@ from sim.read.tables import key_figures, notes, tables_of
 from sim.reports.report import answer
 from tests.read.test_invariance import LENS, SCENES
 
+#: Bonds that live for 14 ms at 2 mm/s.
+AGED = """
+solid = { shear_modulus = "1.6 MPa" }
+sphere = { radius = "2 mm" }
+adhesion = { work = "42 mJ/m^2" }
+contact = { load = "4 mN" }
+[bonds]
+model = "rate"
+start = "empty"
+rupture = { model = "bell", zero_force_rate = "1 1/s", bell_force = "4 pN" }
+bond_stiffness = "0.8 uN/m"
+rebinding_rate = "5 1/s"
+site_density = "6.5e16 1/m^2"
+"""
 NAN = math.nan
 
 
@@ -586,6 +601,26 @@ def test_a_clock_step_after_the_peak_of_a_start_states_no_static_threshold():
             assert bool(one.value.notnull()) is is_seen
         after = of_events(dataset)["phase_peak_after_hold"].isel({"phase": 1})
         assert bool(after.value.notnull()) is is_seen
+
+
+@pytest.mark.parametrize("drive", ["start", "holds"])
+def test_a_maximum_after_a_hidden_peak_is_no_peak(drive):
+    """At 20 ms the peak of 32 mN at 11 ms is past, and friction rises again to a maximum of 2.4 mN at 40 ms."""
+    scene = tomllib.loads(AGED)
+    scene["drive"] = {"model": "start", "rest": 0.5, "speed": 2e-3}
+    if drive == "holds":
+        scene["drive"] = {"model": "holds", "speed": 2e-3, "slide": 0.5, "holds": [0.5]}
+    for step, is_seen in (("20 ms", False), ("1 ms", True)):
+        made = sim.load(scene | {"clock": {"duration": "1.5 s", "step": step}})
+        dataset = run(made)
+        after = of_events(dataset)["phase_peak_after_hold"]
+        assert bool(after.value.notnull().any()) is is_seen
+        # the first phase has no hold before, of which nothing is hidden
+        assert "clock.step" not in str(after.reason.values.flat[0])
+        peaks, threshold = read.peaks(dataset), static_threshold(dataset)
+        assert bool(peaks) is (drive == "start")
+        for name, one in (peaks | (threshold if peaks else {})).items():
+            assert bool(one.value.notnull()) is is_seen, name
 
 
 def test_a_clock_step_after_the_peak_of_a_hold_states_no_peak_and_a_cure():
