@@ -13,7 +13,7 @@ are left out. The likelihood ratio of a mechanism has the distribution of the da
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -286,14 +286,87 @@ def plan(
     BadInput
         If a key has no effect, the table cannot be read or has no errors, or the drive needs runs.
     """
-    base, common = scenario.with_values({"record": {}}), common or {}
-    seed = scenario.seed if seed is None else seed
     if sims < LEAST_SIMS:
         raise BadInput(
             [
                 f"sims: {sims} simulated data sets do not show a probability; give {LEAST_SIMS} or more"
             ]
         )
+    asked = _asked(scenario, points, free, candidates, common or {})
+    design, further = asked.design, asked.further
+    problem, seed = design.problem, scenario.seed if seed is None else seed
+    count = 1 + len(problem.free) + len(further) + min(len(further), _BEST)
+    with progress_bar(count, "steps of the plan") as bar:
+        done = itertools.count(1)
+
+        def advance() -> None:
+            if progress is None:
+                bar.advance(1)
+            else:
+                progress(next(done), count)
+
+        first = design.simulated(sims, seed)
+        advance()
+        expected = list[Expected]()
+        for k in range(len(problem.free)):
+            expected.append(_interval(problem, k, first))
+            advance()
+        ranked = list[tuple[Point, _Design]]()
+        for row in further:
+            ranked.append(asked.beside(row, first.rare))
+            advance()
+        ranked.sort(key=lambda item: -sum(item[0].estimate.values()))
+        proposed = [point for point, _ in ranked]
+        for k, (point, beside) in enumerate(ranked[:_BEST]):
+            chances = beside.simulated(sims, seed + 1 + k).probabilities
+            proposed[k] = point._replace(probabilities=chances)
+            advance()
+    proposed.sort(
+        key=lambda item: (
+            -sum(chance.probability for chance in item.probabilities.values())
+        )
+    )
+    probabilities = first.probabilities if design.parts else {}
+    result = Plan(problem, tuple(expected), probabilities, tuple(proposed), ())
+    remarks = [*asked.remarks, *(_at_ends(result) if candidates is None else ())]
+    return result._replace(remarks=tuple(remarks))
+
+
+class _Asked(NamedTuple):
+    """What a plan is asked: its planned points and their table, rows of further points, and remarks on them."""
+
+    base: Scenario
+    table: Measured
+    common: dict[str, float]
+    design: _Design
+    further: list[Measured]
+    remarks: list[str]
+
+    def beside(self, row: Measured, rare: dict[str, float]) -> tuple[Point, _Design]:
+        """Return a further point with its estimate, and the design of the planned points with it."""
+        problem = self.design.problem
+        tables = [self.table, _with_errors(row, problem)]
+        design = _Design(_predicted(self.base, tables, [*problem.free], self.common))
+        conditions = {key: float(value) for key, (value,) in row.conditions.items()}
+        words = _words(self.base, self.table, row)
+        return Point(conditions, words, design.estimate(rare), {}), design
+
+
+def _asked(
+    scenario: Scenario,
+    points: Path | Measured,
+    free: Iterable[str],
+    candidates: Path | None,
+    common: dict[str, float],
+) -> _Asked:
+    """Return what a plan is asked, see ``plan``.
+
+    Raises
+    ------
+    BadInput
+        If a key has no effect, the table cannot be read or has no errors, or the drive needs runs.
+    """
+    base = scenario.with_values({"record": {}})
     if base.drive.solves_motion:
         raise BadInput(
             [
@@ -323,58 +396,22 @@ def plan(
     if not design.parts:
         further, cause = [], "bonds or fluctuations do not act in the scenario as it is"
         remarks.append(f"no mechanisms are told apart, because {cause}")
-    count = 1 + len(numbers) + len(further) + min(len(further), _BEST)
-    with progress_bar(count, "steps of the plan") as bar:
-        done = itertools.count(1)
+    return _Asked(base, table, common, design, further, remarks)
 
-        def advance() -> None:
-            if progress is None:
-                bar.advance(1)
-            else:
-                progress(next(done), count)
 
-        first = design.simulated(sims, seed)
-        advance()
-        expected = list[Expected]()
-        for k in range(len(numbers)):
-            expected.append(_interval(problem, k, first))
-            advance()
-        ranked = list[tuple[Point, _Design]]()
-        for row in further:
-            tables = [table, _with_errors(row, problem)]
-            beside = _Design(_predicted(base, tables, numbers, common))
-            point = Point(
-                {key: float(value) for key, (value,) in row.conditions.items()},
-                _words(base, table, row),
-                beside.estimate(first.rare),
-                {},
-            )
-            ranked.append((point, beside))
-            advance()
-        ranked.sort(key=lambda item: -sum(item[0].estimate.values()))
-        proposed = [point for point, _ in ranked]
-        for k, (point, beside) in enumerate(ranked[:_BEST]):
-            chances = beside.simulated(sims, seed + 1 + k).probabilities
-            proposed[k] = point._replace(probabilities=chances)
-            advance()
-    proposed.sort(
-        key=lambda item: (
-            -sum(chance.probability for chance in item.probabilities.values())
+def _at_ends(result: Plan) -> Iterator[str]:
+    """Yield a remark if a speed beyond those that are proposed by default may be better than the best of them."""
+    if not result.best:
+        return
+    certain = dict.fromkeys(result.probabilities, Chance(1.0, 0.0))
+    speeds = [point.conditions["speed"] for point in result.points]
+    best = {point.conditions["speed"] for point in result.best}
+    can_rise = _is_more(certain, result.best[0].probabilities)
+    if can_rise and best & {min(speeds), max(speeds)}:
+        yield (
+            "a best speed is the first or last candidate; speeds beyond may be better:"
+            " sim fit --plan --candidates takes them"
         )
-    )
-    probabilities = first.probabilities if design.parts else {}
-    result = Plan(problem, tuple(expected), probabilities, tuple(proposed), ())
-    certain = dict.fromkeys(probabilities, Chance(1.0, 0.0))
-    if result.best and candidates is None:
-        speeds = [point.conditions["speed"] for point in proposed]
-        best = {point.conditions["speed"] for point in result.best}
-        can_rise = _is_more(certain, result.best[0].probabilities)
-        if can_rise and best & {min(speeds), max(speeds)}:
-            remarks.append(
-                "a best speed is the first or last candidate; speeds beyond may be better:"
-                " sim fit --plan --candidates takes them"
-            )
-    return result._replace(remarks=tuple(remarks))
 
 
 def _read(
