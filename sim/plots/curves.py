@@ -45,8 +45,6 @@ _OF_CONTACT = (
     "shear_stress",
 )
 
-#: Name of the inner band of a curve, or of its bars.
-_ERROR = "± standard error"
 
 #: Markers that stand for line styles where points are not joined.
 _MARKS = {"-": "o", "--": "s", "-.": "^", ":": "v"}
@@ -133,7 +131,7 @@ class Scene(NamedTuple):
     @property
     def bands(self) -> tuple[str, str]:
         """Names of the outer and the inner band of a curve."""
-        return self.spread, _ERROR
+        return self.spread, style.ERROR
 
     @property
     def over_time(self) -> bool:
@@ -294,11 +292,11 @@ def curve(panel: Axes, scene: Scene, name: str, line: Line, factor: float) -> No
     label = line.label if np.any(np.isfinite(mean)) else ""
     panel.plot(x, mean, color=colour, label=label, **scene.look(line.style))
     if np.any(sem > 0.0) and scene.over_time:
-        inner: Any = {"color": colour, "alpha": 0.45, "label": _ERROR}
+        inner: Any = {"color": colour, "alpha": 0.45, "label": style.ERROR}
         style.fill(panel, x, mean - sem, mean + sem, **inner)
     elif np.any(sem > 0.0):
         bars: Any = {"fmt": "none", "ecolor": colour, "elinewidth": 0.8, "capsize": 1.5}
-        bars["label"] = _ERROR
+        bars["label"] = style.ERROR
         panel.errorbar(x, mean, np.nan_to_num(sem), **bars)
 
 

@@ -361,7 +361,7 @@ def holds_figure(dataset: xr.Dataset) -> Figure:
     factor = style.in_unit(
         panel.yaxis, "friction peak after a hold $F_s$", np.ravel(peak.value), "N"
     )
-    unit = style.Unit.of(np.ravel(held.value), "s", logarithmic=True)
+    unit, has_bars = style.Unit.of(np.ravel(held.value), "s", logarithmic=True), False
     for line in scene.lines:
         peaks, errors, times = (
             np.ravel(each.isel(line.point, missing_dims="ignore"))
@@ -376,7 +376,12 @@ def holds_figure(dataset: xr.Dataset) -> Figure:
         words = _ageing_in_words(run, line)
         label = ": ".join(filter(None, ["" if scene.single else line.label, words]))
         look: Any = {"color": line.colour, "marker": "o", "markersize": 3.5}
-        panel.errorbar(x, y, factor * errors[order], label=label or None, **look)
+        panel.plot(x, y, label=label or None, **look)
+        bars = factor * errors[order]
+        if np.any(bars > 0.0):
+            name = None if has_bars else style.ERROR
+            panel.errorbar(x, y, bars, fmt="none", ecolor=line.colour, label=name)
+            has_bars = True
     reach = unit.factor * np.ravel(held.value)
     style.across(panel, reach, unit.label("time held $t_h$"), "log", room=0.03)
     panel.set_ylim(bottom=0.0)

@@ -50,6 +50,8 @@ def part_of(colours: str, first: float, last: float) -> mpl.colors.ListedColorma
 
 SHADES = part_of("viridis", 0.0, 0.92)
 
+#: Name of bars or of a band about a mean in a legend.
+ERROR = "± standard error"
 #: A closed form beneath what was simulated, a line that only guides the eye, and a marker with a white face.
 GREY: Any = {"color": REFERENCE, "linewidth": 0.9, "zorder": 1.5}
 GUIDE: Any = {"color": REFERENCE, "linewidth": 0.5, "zorder": 1}
