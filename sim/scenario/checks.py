@@ -281,17 +281,18 @@ class Limits(NamedTuple):
 
 def limits(scene: Scene) -> Limits:
     """Return the numbers that tell if a scene lies within the theory."""
-    work, size, solid = scene.adhesion.work, scene.sphere.radius, scene.elastic
+    work, size = scene.adhesion.work, scene.sphere.radius
+    body = scene.softer_body
     low, high = sorted((0.5 * work, WATER))
     lengths = elastocapillary_length(
-        np.array([low, high]), solid.shear_modulus, solid.poisson_ratio
+        np.array([low, high]), body.own_shear_modulus, body.poisson_ratio
     )
     distances = np.array(scene.contact.distances(work))
-    tabor = tabor_number(work, size, solid.contact_modulus, distances)
+    tabor = tabor_number(work, size, scene.elastic.contact_modulus, distances)
     return Limits(
         (float(tabor[0]), float(tabor[1])),
         scene.widest / size,
-        _largest_stress(scene) / solid.shear_modulus,
+        _largest_stress(scene) / body.own_shear_modulus,
         _of_squeeze(scene),
         _of_parabola(scene),
         (low, high),

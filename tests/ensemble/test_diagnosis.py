@@ -832,6 +832,18 @@ def test_a_scene_outside_of_the_theory_is_told_with_the_number_and_the_points(sc
     firm = scene(bonds={"model": "none", "stress": 0.08 * G})
     assert remarks(Plan.of(firm)) == []
     assert limits(firm)["tau0/G"][0] == "0.08"
+    # two bodies bear the same stress, which strains the softer one most, whichever is the sphere
+    soft, hard = {"shear_modulus": G}, {"youngs_modulus": 9.0 * G, "poisson_ratio": 0.3}
+    for bodies in (
+        soft | {"counter_body": soft},
+        soft | {"counter_body": hard},
+        hard | {"counter_body": soft},
+    ):
+        pair = scene(solid=bodies, bonds={"model": "none", "stress": 0.08 * G})
+        assert said(remarks(Plan.of(pair)), "the mean stress is") == []
+        assert limits(pair)["tau0/G"][0] == "0.08"
+        ends = f"{0.5 * W / 3.0 / G:.3g} to {0.072 / 3.0 / G:.3g} m"
+        assert limits(pair)["gamma/E"][0] == ends
     # a sphere without adhesion is Hertz's, whatever its Tabor number
     hertz = scene(**TIP | {"adhesion.work": 0.0}, **{"contact.load": "1 nN"})
     assert said(remarks(Plan.of(hertz)), "the Tabor number") == []
