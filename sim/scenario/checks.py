@@ -302,7 +302,7 @@ def limits(scene: Scene) -> Limits:
 
 def _largest_stress(scene: Scene) -> float:
     """Return the largest mean stress in steady sliding, or that of a prescribed force on the contact at rest [Pa]."""
-    largest = float(np.max(scene.strengths[1]))
+    largest = float(np.max(scene.steady_stress))
     if not scene.drive.forces or not scene.rest_radius > 0.0:
         return largest
     force = max(map(abs, scene.drive.forces))
@@ -405,7 +405,7 @@ def remarks_between(scene: Scene) -> list[str]:
     remarks += _remark_on_unit(shear, float(strength.max()))
     rms = math.sqrt(shear.spectrum.variance) * shear.amplitude.factor(speeds, strength)
     if not shear.spectrum.bond_made and np.any(
-        (rms > _MOST_REVERSED * strength) & (strength > 0.0)
+        (rms > _MOST_REVERSED * scene.steady_stress) & (strength > 0.0)
     ):
         remarks.append(
             f"rms fluctuations exceed {_MOST_REVERSED} of the mean stress: patches of reversed friction"

@@ -529,6 +529,12 @@ class Scenario:
         strength = self.population.steady(speeds).strength
         return speeds, np.broadcast_to(strength, speeds.shape)
 
+    @property
+    def steady_stress(self) -> np.ndarray:
+        """Return the shear stress in steady sliding at the speeds of ``strengths``, with the viscous one [Pa]."""
+        speeds, strength = self.strengths
+        return strength + self.drive.viscosity * np.abs(speeds)
+
     @cached_property
     def limits(self) -> Limits:
         """Return the numbers that tell if the scene lies within the theory."""
