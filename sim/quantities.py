@@ -1000,6 +1000,7 @@ NUMBERS: tuple[Definition, ...] = (
         "Poisson ratio of the tangential compliance",
         symbol="nu",
     ),
+    Definition("softer_shear_modulus", "Pa", "shear modulus of the softer body"),
     Definition(
         "has_noise", "1", "1 if the scenario has random parts, so that members differ"
     ),

@@ -19,10 +19,9 @@ Values = Mapping[str, float]
 
 #: Relative step of a sensitivity; sensitivities below this are none.
 _STEP, _NOTHING = 1e-4, 1e-6
-#: Tables whose numbers do not matter to steady sliding at a given speed.
+#: Tables whose numbers do not matter to steady sliding at a given speed; of the drive only one number does.
 _NO_PHYSICS = (
     "clock",
-    "drive",
     "ensemble",
     "incipient",
     "instrument",
@@ -93,7 +92,8 @@ def _in_steady_sliding(
         scenario.elastic.stored_energy(shear.spectrum) if stored is None else stored
     )
     terms = scenario.work.balance(bonding, energy + still, still)
-    return motion, bonding, energy, terms
+    viscous = scenario.drive.viscosity * speed
+    return motion, bonding._replace(stress=bonding.stress + viscous), energy, terms
 
 
 def _trajectory(
@@ -153,7 +153,9 @@ def sensitivities(
         else {},
     )
     for key, (quantity, value) in quantities(scenario).items():
-        if value and not quantity.whole and key.partition(".")[0] not in _NO_PHYSICS:
+        table = key.partition(".")[0]
+        matters = table not in _NO_PHYSICS and table != "drive"
+        if value and not quantity.whole and (matters or key == "drive.viscosity"):
             steps = (
                 -_STEP,
                 _STEP
@@ -179,5 +181,6 @@ def _logarithms(scenario: Scenario, speed: float, time: float) -> Array:
         if course.radius[0, 0] > 0.0
         else math.nan
     )
-    stress = float(course.strength[0, 0])
+    # at rest bonds without a stretch have a strength, but no stress
+    stress = float(course.strength[0, 0]) + scenario.drive.viscosity * abs(speed)
     return np.array([area, area + math.log(stress) if stress > 0.0 else 0.0])

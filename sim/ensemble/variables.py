@@ -539,6 +539,9 @@ NUMBERS = (
     Variable("contact_modulus", "", lambda scene: scene.elastic.contact_modulus),
     Variable("effective_shear_modulus", "", lambda scene: scene.elastic.shear_modulus),
     Variable("effective_poisson_ratio", "", lambda scene: scene.elastic.poisson_ratio),
+    Variable(
+        "softer_shear_modulus", "", lambda scene: scene.softer_body.own_shear_modulus
+    ),
     Variable("has_noise", "", lambda scene: float(scene.is_random)),
     Variable("radius_at_rest", "", lambda scene: scene.rest_radius),
     Variable(

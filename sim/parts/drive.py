@@ -43,6 +43,8 @@ class _Sliding(Part):
     solves_motion: ClassVar[bool] = False
     #: Tangential forces among which is the largest of a run, if the force is prescribed and not the motion [N].
     forces: ClassVar[tuple[float, ...]] = ()
+    #: Viscosity of the interface [Pa s/m], which a prescribed motion does not have.
+    viscosity: ClassVar[float] = 0.0
 
     def faults(self, is_stretched: bool, is_reversible: bool) -> dict[str, str]:
         """Return faults of this drive, as ``_Driven.faults``: none, as it does not feel the friction."""

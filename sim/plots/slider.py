@@ -53,7 +53,7 @@ def scenario_at(dataset: xr.Dataset, point: dict[str, int]) -> Any:
 def steady_law(
     dataset: xr.Dataset, point: dict[str, int], speed: np.ndarray
 ) -> np.ndarray:
-    """Return shear stress [Pa] and bond fraction [1] of a scenario's bonds in steady sliding at speeds [m/s].
+    """Return shear stress [Pa], the viscous one included, and bond fraction [1] in steady sliding at speeds [m/s].
 
     The stress has the sign of the speed. Both are nan if the scenario cannot be read.
     """
@@ -61,7 +61,8 @@ def steady_law(
     if scenario is None:
         return np.full((2, speed.size), np.nan)
     steady = scenario.population.steady(speed)
-    return np.stack([np.copysign(steady.strength, speed), steady.fraction])
+    stress = np.copysign(steady.strength, speed) + scenario.drive.viscosity * speed
+    return np.stack([stress, steady.fraction])
 
 
 # -- behind a spring, or under a force ----------------------------------------------------------

@@ -606,15 +606,15 @@ def _strains(run: Run) -> Iterator[str]:
     That of steady sliding is known before the run, and ``sim check`` remarks on it.
     """
     dataset = run.dataset
-    if not {"peak_stress", "static_threshold", "effective_shear_modulus"} <= {*dataset}:
+    if not {"peak_stress", "static_threshold", "softer_shear_modulus"} <= {*dataset}:
         return
     largest = abs(dataset["peak_stress"].astype(float))
     if MEMBERS in largest.dims:
         largest = largest.mean(MEMBERS)
-    strain = ensemble_mean(largest) / dataset["effective_shear_modulus"]
+    strain = ensemble_mean(largest) / dataset["softer_shear_modulus"]
     if bool((strain > FINITE_STRAIN).any()):
         yield (
-            f"the shear stress reaches {float(strain.max()):.2g} times the effective shear modulus"
+            f"the shear stress reaches {float(strain.max()):.2g} times the shear modulus"
             f"{_at_points(run, strain == strain.max())}: finite strains, which are left out, reduce the area from about"
             f" {FINITE_STRAIN} on"
         )

@@ -281,17 +281,18 @@ class Limits(NamedTuple):
 
 def limits(scene: Scene) -> Limits:
     """Return the numbers that tell if a scene lies within the theory."""
-    work, size, solid = scene.adhesion.work, scene.sphere.radius, scene.elastic
+    work, size = scene.adhesion.work, scene.sphere.radius
+    body = scene.softer_body
     low, high = sorted((0.5 * work, WATER))
     lengths = elastocapillary_length(
-        np.array([low, high]), solid.shear_modulus, solid.poisson_ratio
+        np.array([low, high]), body.own_shear_modulus, body.poisson_ratio
     )
     distances = np.array(scene.contact.distances(work))
-    tabor = tabor_number(work, size, solid.contact_modulus, distances)
+    tabor = tabor_number(work, size, scene.elastic.contact_modulus, distances)
     return Limits(
         (float(tabor[0]), float(tabor[1])),
         scene.widest / size,
-        _largest_stress(scene) / solid.shear_modulus,
+        _largest_stress(scene) / body.own_shear_modulus,
         _of_squeeze(scene),
         _of_parabola(scene),
         (low, high),
@@ -301,7 +302,7 @@ def limits(scene: Scene) -> Limits:
 
 def _largest_stress(scene: Scene) -> float:
     """Return the largest mean stress in steady sliding, or that of a prescribed force on the contact at rest [Pa]."""
-    largest = float(np.max(scene.strengths[1]))
+    largest = float(np.max(scene.steady_stress))
     if not scene.drive.forces or not scene.rest_radius > 0.0:
         return largest
     force = max(map(abs, scene.drive.forces))
@@ -404,7 +405,7 @@ def remarks_between(scene: Scene) -> list[str]:
     remarks += _remark_on_unit(shear, float(strength.max()))
     rms = math.sqrt(shear.spectrum.variance) * shear.amplitude.factor(speeds, strength)
     if not shear.spectrum.bond_made and np.any(
-        (rms > _MOST_REVERSED * strength) & (strength > 0.0)
+        (rms > _MOST_REVERSED * scene.steady_stress) & (strength > 0.0)
     ):
         remarks.append(
             f"rms fluctuations exceed {_MOST_REVERSED} of the mean stress: patches of reversed friction"

@@ -24,7 +24,7 @@ from sim.numerics.grid import Lattice
 from sim.parts.bonds.models import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
 from sim.parts.contact.balance import Bodies, Shares
-from sim.parts.contact.models import Adhesion, EffectiveWork, Solid, Sphere
+from sim.parts.contact.models import Adhesion, Body, EffectiveWork, Solid, Sphere
 from sim.parts.drive import Drive, Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
@@ -356,7 +356,16 @@ class Scenario:
     @cached_property
     def elastic(self) -> ElasticSolid:
         """Return the elastic solid, at the temperature."""
-        return self._at_temperature("solid", self.solid).elastic
+        return self._solid_at_temperature.elastic
+
+    @property
+    def softer_body(self) -> Body:
+        """Return the body of the lower shear modulus, at the temperature."""
+        return self._solid_at_temperature.softer
+
+    @cached_property
+    def _solid_at_temperature(self) -> Solid:
+        return self._at_temperature("solid", self.solid)
 
     @cached_property
     def contact_at_temperature(self) -> Contact:
@@ -519,6 +528,12 @@ class Scenario:
         speeds = np.unique(self.speeds(_SPEEDS))
         strength = self.population.steady(speeds).strength
         return speeds, np.broadcast_to(strength, speeds.shape)
+
+    @property
+    def steady_stress(self) -> np.ndarray:
+        """Return the shear stress in steady sliding at the speeds of ``strengths``, with the viscous one [Pa]."""
+        speeds, strength = self.strengths
+        return strength + self.drive.viscosity * np.abs(speeds)
 
     @cached_property
     def limits(self) -> Limits:

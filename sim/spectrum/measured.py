@@ -20,7 +20,7 @@ from sim.laws.halfspace import compliance, free_energy_of_map
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Lattice, lattice_of
 from sim.spectrum.family import Array, Weight
-from sim.spectrum.radial import PowerLaws, Rowed, Rows
+from sim.spectrum.radial import LinearRows, Lines, PowerLaws, Rowed, Rows
 from sim.units.quantity import Quantity, keyed
 from sim.units.tables import (
     LISTED,
@@ -110,6 +110,11 @@ class RowsFromFile(FromFile, Rowed):
             )
         return self
 
+    @staticmethod
+    def _variance(chain: Rows) -> float:
+        """Return the variance of rows between which the density is as in this model [Pa²]."""
+        return PowerLaws(chain).variance
+
     @property
     def _falling(self) -> bool:
         return len(self.wavenumbers) > 1 and self.wavenumbers[0] > self.wavenumbers[-1]
@@ -128,9 +133,7 @@ class RowsFromFile(FromFile, Rowed):
         return (
             chain
             if self.rms is None
-            else Rows(
-                chain.q, chain.density * (self.rms**2 / PowerLaws(chain).variance)
-            )
+            else Rows(chain.q, chain.density * (self.rms**2 / self._variance(chain)))
         )
 
 
@@ -553,8 +556,8 @@ def radial_average(density: Array, grid: Lattice) -> RadialAverage:
 
 
 @keyed()
-class Measured(RowsFromFile):
-    """The radially averaged spectrum of measured stress maps, used as a table.
+class Measured(RowsFromFile, LinearRows):
+    """The radially averaged spectrum of measured stress maps, used as a table that is linear between its rows.
 
     Parameters
     ----------
@@ -577,11 +580,25 @@ class Measured(RowsFromFile):
 
     Notes
     -----
-    The mean is removed. Rings of one lattice step 2π/L are averaged, L the side, or of a map that is not square
-    the side of a square as large; the rows reach from π/L to the outer edge of the last ring below
-    Nyquist, level in the innermost and the outermost half ring, so that waves longer than twice the
-    map and the corners beyond Nyquist are not part of the spectrum. A direction in which waves are stronger than in
-    others is lost, and with it up to some 30 % of the energy: ``StressMap`` keeps the very map.
+    The mean is removed. The spectrum has the variance of the map and the energy that its waves store at a mean over
+    directions, both exactly, see ``estimate``. Of a map under a window these are the sums of the tapered map, which
+    has the mean square of the map only on average over the places at which it may be cut out. Waves in the corners
+    beyond Nyquist count, and no wave is longer than about 2.4 times the longest side.
+
+    A direction in which waves are stronger than in others is lost, and with it up to some 30 % of the energy:
+    ``StressMap`` keeps the very map.
+
+    Examples
+    --------
+    A single wave becomes a triangle about its wavenumber, which keeps its variance and its energy:
+
+    >>> wave = np.cos(2 * np.pi * 5 * np.arange(32) / 32)[:, None] * np.ones(32)
+    >>> q, density = estimate(wave[None], 2 * np.pi, "none")
+    >>> print([f"{k:.0f}" for k in q[density > 1e-9]])
+    ['5']
+    >>> spectrum = Measured("", wavenumbers=tuple(q), densities=tuple(density))
+    >>> print(f"{spectrum.variance:.12f} {spectrum.over_wavenumber[0] * 5:.12f}")
+    0.500000000000 0.500000000000
     """
 
     file: Annotated[
@@ -603,6 +620,11 @@ class Measured(RowsFromFile):
     densities: Densities = ()
     rms: Rescaled | None = None
     model: Literal["measured"] = "measured"
+
+    @staticmethod
+    def _variance(chain: Rows) -> float:
+        """Return the variance of rows between which the density is linear [Pa²]."""
+        return Lines(chain).variance
 
     @property
     def rms_of_map(self) -> float:  # type: ignore[override]
@@ -626,14 +648,54 @@ class Measured(RowsFromFile):
 def estimate(
     maps: Array, cell: float | tuple[float, float], window: str
 ) -> tuple[Array, Array]:
-    """Return the rows of the radial spectrum of maps (maps, x, y), averaged over them."""
+    """Return the rows of the radial spectrum of maps, averaged over them.
+
+    Parameters
+    ----------
+    maps : array, shape (maps, nx, ny)
+        Stress [Pa].
+    cell : float or (float, float)
+        Sides of a map along x and y [m].
+    window : {"none", "hann"}
+        As of ``periodogram``.
+
+    Returns
+    -------
+    (array, array)
+        Wavenumbers [rad/m] and densities [Pa² m²], between which the density is linear.
+
+    Notes
+    -----
+    The rows are the multiples of w = 2π/L, L the longest side. A wave of variance P at the wavenumber q has the share
+    P/q of ``∫ C dq / 2π``, to which the energy is proportional. This share is divided linearly between the two rows
+    beside q. The triangle of the density about a row kw has the mean wavenumber kw, so that both ``Σ P/q`` and, by
+    their mean wavenumbers, ``Σ P`` are kept for any map. Below the first row the density is level, over the length
+    w/√3 for which the mean wavenumber is w.
+
+    The division smooths: a density ∝ q^-α is about α(α + 1)/(12k²) too large at the row k. For the slopes of rough
+    surfaces, α ≤ 4, this is less than the scatter 1/√(πk) of 2πk random waves from the third row on. The number of
+    lattice points near a row is not quite 2πk, which changes its density by up to 0.1/√k, and the first one by a sixth.
+    """
     lattice = lattice_of(cell, maps.shape[-2:])
-    ring = radial_average(np.mean(periodogram(maps, cell, window), axis=0), lattice)
-    # the innermost ring begins at half its wavenumber and the outermost ends half a ring beyond: there they stay level
-    length = side_of_rings(lattice)
-    first, last = (np.pi / length, (2 * len(ring.q) + 1) * np.pi / length)
-    q = np.concatenate([[first], ring.q, [last]])
-    return q, np.concatenate([ring.density[:1], ring.density, ring.density[-1:]])
+    step = 2 * np.pi / max(lattice.sides)
+    power = lattice.multiplicity * np.mean(periodogram(maps, cell, window), axis=0)
+    q = np.hypot(*lattice.wavevectors) / step
+    is_wave = q > 0.0
+    q, power = q[is_wave], power[is_wave] / lattice.area
+    share = power / (q * step)
+    # rounding brings the longest wave below the first row
+    q = np.maximum(q, 1.0)
+    row = np.floor(q).astype(int)
+    above = q - row
+    count = int(row.max()) + 1
+    sums = np.bincount(row - 1, share * (1.0 - above), count)
+    sums += np.bincount(row, share * above, count)
+    level = 1.0 / math.sqrt(3.0)
+    widths = np.ones(count)
+    widths[0] = level + 0.5
+    density = 2 * np.pi * sums / (widths * step)
+    rows = np.concatenate([[1.0 - level], np.arange(1.0, count + 2.0)])
+    return rows * step, np.concatenate([density[:1], density, [0.0]])
 
 
 # A measured map of the shear stress, used as it is: its file, its mean, and the energy that it stores. x is the

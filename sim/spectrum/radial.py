@@ -466,10 +466,14 @@ class Rowed(Isotropic, Protocol):
             np.searchsorted(self.rows.q, q, side="right") - 1, len(self.rows.q) - 2
         )
 
+    def _is_linear(self) -> NDArray[np.bool_]:
+        """Return True for each piece that is linear: no power law ends at zero."""
+        return (self.rows.density[1:] == 0.0) | (self.rows.density[:-1] == 0.0)
+
     @functools.cached_property
     def _slopes(self) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Exponent where a piece is a power law, gradient where it is linear, and which it is."""
-        linear = (self.rows.density[1:] == 0.0) | (self.rows.density[:-1] == 0.0)
+        linear = self._is_linear()
         logs = np.log(np.where(self.rows.density > 0.0, self.rows.density, 1.0))
         exponent = np.where(linear, 0.0, np.diff(logs) / np.diff(np.log(self.rows.q)))
         gradient = np.where(
@@ -510,6 +514,14 @@ class Rowed(Isotropic, Protocol):
         return np.where(linear[row], straight, powered)
 
 
+class LinearRows(Rowed, Protocol):
+    """Base of isotropic spectra that are linear between neighbouring rows, zero outside."""
+
+    def _is_linear(self) -> NDArray[np.bool_]:
+        """Return True for each piece."""
+        return np.ones(len(self.rows.q) - 1, bool)
+
+
 @dataclass(frozen=True, eq=False)
 class PowerLaws(Rowed):
     """A radial density of some rows.
@@ -521,6 +533,21 @@ class PowerLaws(Rowed):
     >>> flat = PowerLaws(Rows(np.array([1.0, 2.0]), np.array([1.0, 1.0])))
     >>> print(round(4 * np.pi * float(flat.cumulative(9.0)), 12))
     3.0
+    """
+
+    rows: Rows
+
+
+@dataclass(frozen=True, eq=False)
+class Lines(LinearRows):
+    """A radial density of some rows, linear between them.
+
+    Examples
+    --------
+    A density that falls from 3 Pa² m² to zero over 1 rad/m has ``∫ C dq`` = 3/2:
+
+    >>> print(Lines(Rows(np.array([1.0, 2.0]), np.array([3.0, 0.0]))).line_integral)
+    1.5
     """
 
     rows: Rows

@@ -777,6 +777,31 @@ def test_a_prescribed_force_has_a_mean_stress_although_its_speed_is_not_known(sc
     assert not said(remarks(Plan.of(pulled("1 mN"))), "the mean stress is")
 
 
+def test_steady_sliding_on_a_viscous_interface_bears_what_its_run_does(scene):
+    stage, viscosity = "0.4 mm/s", 5e8
+    spring = {"model": "spring", "stage": stage, "stiffness": "1 kN/m"}
+    dry = scene(drive=spring | {"damping": "10 mN s/m"}, bonds=STRETCHED)
+    wet = scene(drive=spring | {"viscosity": viscosity}, bonds=STRETCHED)
+    of_bonds = float(dry.limits.strain) * G
+    total = of_bonds + viscosity * 4e-4
+    assert limits(wet)["tau0/G"][0] == f"{total / G:.3g}"
+    result = sensitivities(wet, 0.0, 4e-4)
+    area, friction = result["drive.viscosity"]
+    assert area == 0.0
+    assert_allclose(friction, 1.0 - of_bonds / total, rtol=1e-6)
+    area, friction = result["bonds.site_density"]
+    assert_allclose(friction - area, of_bonds / total, rtol=1e-6)
+    assert "drive.viscosity" not in sensitivities(dry, 0.0, 4e-4)
+    curves = sim.steady_curves(wet, np.array([4e-4]))
+    stress = curves["friction_force"] / curves["contact_area"]
+    assert_allclose(stress, total, rtol=1e-12)
+    clock = {"clock.duration": "0.1 s", "clock.step": "1 ms", "clock.record": "10 ms"}
+    course = sim.run(wet.with_values(clock | {"drive.start": "steady"}))
+    # the run starts in steady sliding, as well as the tolerance of its motion keeps it
+    tolerance = wet.drive.tolerance
+    assert_allclose(course["shear_stress"], total, rtol=10.0 * tolerance)
+
+
 def test_a_loss_of_rounding_is_printed_as_zero(scene):
     lens = {"solid.shear_modulus": 1.6e6, "sphere.radius": 2e-3, "adhesion.work": 42e-3}
     course = {"from": "2 um", "to": "-25 um"}
@@ -832,6 +857,18 @@ def test_a_scene_outside_of_the_theory_is_told_with_the_number_and_the_points(sc
     firm = scene(bonds={"model": "none", "stress": 0.08 * G})
     assert remarks(Plan.of(firm)) == []
     assert limits(firm)["tau0/G"][0] == "0.08"
+    # two bodies bear the same stress, which strains the softer one most, whichever is the sphere
+    soft, hard = {"shear_modulus": G}, {"youngs_modulus": 9.0 * G, "poisson_ratio": 0.3}
+    for bodies in (
+        soft | {"counter_body": soft},
+        soft | {"counter_body": hard},
+        hard | {"counter_body": soft},
+    ):
+        pair = scene(solid=bodies, bonds={"model": "none", "stress": 0.08 * G})
+        assert said(remarks(Plan.of(pair)), "the mean stress is") == []
+        assert limits(pair)["tau0/G"][0] == "0.08"
+        ends = f"{0.5 * W / 3.0 / G:.3g} to {0.072 / 3.0 / G:.3g} m"
+        assert limits(pair)["gamma/E"][0] == ends
     # a sphere without adhesion is Hertz's, whatever its Tabor number
     hertz = scene(**TIP | {"adhesion.work": 0.0}, **{"contact.load": "1 nN"})
     assert said(remarks(Plan.of(hertz)), "the Tabor number") == []

@@ -143,6 +143,12 @@ class Solid(Body):
         return HalfSpace(modulus, ratio, coupling(*bodies))
 
     @property
+    def softer(self) -> Body:
+        """The body of the lower shear modulus, which a stress of the interface strains most."""
+        bodies = [self] if self.counter_body is None else [self, self.counter_body]
+        return min(bodies, key=lambda body: body.own_shear_modulus)
+
+    @property
     def contact_modulus(self) -> float:
         """E* of both bodies together [Pa]; 4G for one incompressible body, also for a layer of any thickness."""
         return self.elastic.contact_modulus
