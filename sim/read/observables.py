@@ -396,9 +396,9 @@ def observables(
     """Return every recorded trajectory, per member if members differ, and those of ``names`` that follow from them.
 
     ``area_ratio`` is A/A_JKR, with the JKR area for the same mount at that time. ``fraction_detached`` is 1 if the
-    contact is open. ``fraction_masked`` is 1 if a closed contact has no effective work of adhesion (a Hertz contact), and
-    nan if it is open. Their ensemble means are the fractions. Both are nan once the motion of the slider has ended in contact, although
-    the flag ``in_contact`` stays.
+    contact is open. ``fraction_masked`` is 1 if a closed contact has no effective work of adhesion (a Hertz contact),
+    and nan if it is open. Their ensemble means are the fractions. Both are nan once the motion of the slider has ended
+    in contact, although the flag ``in_contact`` stays.
     """
     dataset = plain(dataset)
     result = dataset.drop_vars(
