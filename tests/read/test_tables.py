@@ -489,6 +489,6 @@ def test_a_quantity_that_exists_without_a_mean_keeps_its_column_with_the_reason(
     names = [column.name for one in printed for column in one.columns]
     assert "kinetic_friction" in names and "static_friction" not in names
     reasons = [reason for one in printed for reason in one.reasons]
-    assert ["not settled"] == [
+    assert [
         reason.text for reason in reasons if reason.heading == "kinetic friction"
-    ]
+    ] == ["not settled"]
