@@ -294,8 +294,9 @@ RECORDS: tuple[Definition, ...] = (
     Definition(
         "masked",
         "1",
-        "1 if the effective work of adhesion is not positive (a Hertz contact)",
+        "1 if a closed contact has no positive effective work of adhesion (Hertz)",
         exists_when=WITH_ADHESION,
+        absent=OPEN,
     ),
     Definition(
         "detachment_time",

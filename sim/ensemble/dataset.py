@@ -683,10 +683,10 @@ def padded(values: np.ndarray, length: int) -> np.ndarray:
 def moments(values: np.ndarray) -> np.ndarray:
     """Return count, mean and sum of squared deviations over the first axis, shape (3, records) or (3,).
 
-    They are those of the members that have a value.
+    They are those of the members that have a value: a member that has not detached yet has an infinite time of it.
     """
     rows = np.ascontiguousarray(values.T)
-    known = ~np.isnan(rows)
+    known = np.isfinite(rows)
     count = known.sum(axis=-1)
     with np.errstate(invalid="ignore"):
         mean = rows.sum(axis=-1, where=known) / count

@@ -331,10 +331,10 @@ def _pulled_off(plan: Plan, courses: Courses, examined: Sequence[int]) -> Iterat
     if opened:
         shares = _percents(lost[place] for place in opened)
         where = points_in_words(plan, opened, examined)
-        text = (
-            f"pulled off in steady sliding: up to {shares} of the members at one time"
-        )
-        yield f"{text} {where}".rstrip()
+        text = "pulled off in steady sliding: at one time bonds and fluctuations take what the contact needs in"
+        text = f"{text} up to {shares} of the members {where}".rstrip()
+        adds_up = min(lost[place] for place in opened) < 1.0
+        yield f"{text}{'; members that stay open add up over the run' * adds_up}"
 
 
 def _smallest_area(plan: Plan, courses: Courses) -> Iterator[str]:

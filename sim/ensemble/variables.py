@@ -498,9 +498,7 @@ VARIABLES: tuple[Variable, ...] = (
     Variable(
         "masked",
         "contact",
-        lambda scene, course: ((course.work <= 0.0) & (course.radius > 0.0)).astype(
-            float
-        ),
+        lambda scene, course: np.where(course.radius > 0.0, course.work <= 0.0, np.nan),
     ),
     Variable("detachment_time", "contact", lambda scene, course: course.detached),
     Variable("dissipated_energy", "contact", lambda scene, course: course.dissipated),

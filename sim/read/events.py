@@ -15,6 +15,7 @@ from sim.read.dataset import (
     only_statistics,
     plain,
     recorded_share,
+    setting,
     where_recorded,
 )
 from sim.read.estimate import Estimate, Estimates, explained, of_every_member
@@ -106,6 +107,10 @@ def events(dataset: xr.Dataset) -> Estimates:
         found |= mean_loops(dataset)
     if {"pull_off_error", "pull_off_load"} <= {*dataset}:
         _add_step_errors(found, dataset)
+    for name, one in found.items():
+        if one.bound is not None:
+            # a bound that was compared with recorded statistics has one for each
+            found[name] = one._replace(bound=ensemble_mean(one.bound))
     return _of_contacts(found, dataset)
 
 
@@ -173,24 +178,40 @@ def _add_step_errors(found: Estimates, dataset: xr.Dataset) -> None:
     """Add the bounds of the errors that the clock step makes at pull-offs, if the stepper has recorded one.
 
     The energy lost at a pull-off grows at most with the square of its load, as behind a soft spring. The relative
-    error of an energy is therefore at most twice that of the load.
+    error of an energy is therefore at most twice that of the load. The lowest load has the error of a pull-off that
+    ends its fall, and none if the contact is stable beyond it.
     """
     error = abs(ensemble_mean(dataset["pull_off_error"])).assign_attrs(source="step")
     load = found["pull_off_load"]
     found["pull_off_load"] = load._replace(bound=error)
     if "lowest_load" in found:
         lowest = found["lowest_load"]
-        # the lowest load of a contact that is stable beyond it is another quantity
-        of_pull_off = error.where(lowest.value == load.value)
-        found["lowest_load"] = lowest._replace(
-            bound=of_pull_off.assign_attrs(source="step")
-        )
+        ends_fall = ensemble_mean(lowest.value) == ensemble_mean(load.value)
+        ends_fall = ends_fall & ~_bears_lowest_load(dataset)
+        of_pull_off = error.where(ends_fall).assign_attrs(source="step")
+        found["lowest_load"] = lowest._replace(bound=of_pull_off)
     for name in {"total_dissipated", "loop_dissipation"} & found.keys():
         one = found[name]
         share = error / ensemble_mean(load.value)
         bound = 2.0 * abs(share * ensemble_mean(one.value)).fillna(0.0)
         bound = bound if one.bound is None else bound + one.bound
         found[name] = one._replace(bound=bound.assign_attrs(source="step"))
+
+
+def _bears_lowest_load(dataset: xr.Dataset) -> xr.DataArray:
+    """Return True if a contact bears the lowest load of a prescribed course for longer than a clock step.
+
+    That load is then known exactly, although the time of the pull-off, which comes later, has an error.
+    """
+    names = {"pull_off_time", "lowest_load_time"}
+    with contextlib.suppress(KeyError):
+        if control(dataset).kind == "load" and names <= {*dataset}:
+            opens, reached = (
+                ensemble_mean(dataset[name]).astype(float)
+                for name in ("pull_off_time", "lowest_load_time")
+            )
+            return opens - reached > setting(dataset, "clock.step")
+    return xr.DataArray(False)
 
 
 def pull_offs(dataset: xr.Dataset) -> xr.Dataset:

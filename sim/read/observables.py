@@ -50,7 +50,7 @@ _SOURCES = {
     "fraction_masked": ("masked", "in_contact", "slider_position"),
 }
 #: What else only a closed contact has.
-_OF_AREA = ("area_ratio", "lost_to", "order_of", "indentation")
+_OF_AREA = ("area_ratio", "lost_to", "order_of", "indentation", "fraction_masked")
 _SOURCES_OF_SHARES = (
     "contact_area",
     "fluctuation_energy",
@@ -396,9 +396,9 @@ def observables(
     """Return every recorded trajectory, per member if members differ, and those of ``names`` that follow from them.
 
     ``area_ratio`` is A/A_JKR, with the JKR area for the same mount at that time. ``fraction_detached`` is 1 if the
-    contact is open. ``fraction_masked`` is 1 if it is closed without effective work of adhesion (a Hertz contact).
-    Their ensemble means are the fractions. Both are nan once the motion of the slider has ended in contact, although
-    the flag ``in_contact`` stays.
+    contact is open. ``fraction_masked`` is 1 if a closed contact has no effective work of adhesion (a Hertz contact),
+    and nan if it is open. Their ensemble means are the fractions. Both are nan once the motion of the slider has ended
+    in contact, although the flag ``in_contact`` stays.
     """
     dataset = plain(dataset)
     result = dataset.drop_vars(
@@ -419,10 +419,10 @@ def observables(
         result["fraction_detached"] = defined("fraction_detached", opened)
     if is_wanted("fraction_masked", "masked"):
         masked = dataset["masked"].astype(float, copy=False)
-        with where_recorded():
-            if STATISTIC in masked.dims:  # only of closed contacts it is known
-                masked = masked.where(ensemble_mean(dataset["in_contact"]) == 1.0)
-            result["fraction_masked"] = defined("fraction_masked", masked.where(moves))
+        # an open contact of a file of version 1 has the flag 0
+        if "in_contact" in dataset:
+            masked = masked.where(ensemble_mean(dataset["in_contact"]) > 0.0)
+        result["fraction_masked"] = defined("fraction_masked", masked.where(moves))
     return result.drop_vars(["in_contact", "masked"], errors="ignore")
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 
+import numpy as np
 import xarray as xr
 
 from sim.quantities import SLIP_EVENT
@@ -22,6 +23,8 @@ from sim.read.statistics import summary
 
 #: Path of the stage in a clock step over the advance in a slip event, above which the event is not resolved.
 _COARSE = 0.02
+#: Share of a clock step up to which a time is one of the clock steps, because both are rounded.
+_ON_STEP = 1e-3
 #: Properties of slip events and the quantities of late ones of which the engine records moments.
 _LATE = {
     "static_friction": "force_before",
@@ -277,11 +280,29 @@ def slips_by_phase(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         With the dimension ``phase`` last: ``slip_count``, the means ``static_friction``, ``force_drop`` [N],
         ``slip_amplitude`` [m] and ``recurrence_time`` [s], and the ``start`` [s] of the phase.
+
+    Notes
+    -----
+    A slip event is found to begin up to one clock step early. If the jump of a load or a speed at the start of a phase
+    sets it off, its time is that of the clock step of the jump, or that of the step before. Such an event belongs to
+    the phase if it lasts beyond this start. An event that a turn of the stage ends does not.
     """
-    each, start, end = slips(dataset), dataset["phase_start"], dataset["phase_end"]
-    inside = (each["slip_time"] >= start) & (each["slip_time"] < end)
+    each, start = slips(dataset), dataset["phase_start"]
+    step = setting(dataset, "clock.step")
+    begins, ends, jump = (
+        time / step
+        for time in (
+            each["slip_time"],
+            each["slip_time"] + each["slip_duration"],
+            start,
+        )
+    )
+    first = np.floor(jump + _ON_STEP)
+    lasts = (np.rint(begins) >= first - 1.0) & (np.rint(ends) > first)
+    has_begun = (begins >= jump - _ON_STEP) | lasts
+    inside = has_begun & ~has_begun.shift(phase=-1, fill_value=False)
     each["recurrence_time"] = each["recurrence_time"].where(
-        each["slip_time"] + each["recurrence_time"] < end
+        inside.shift(slip=-1, fill_value=False)
     )
     result = each[list(_LATE)].where(inside).mean("slip", keep_attrs=True)
     result["slip_count"] = defined("phase_slip_count", inside.sum("slip").astype(float))

@@ -674,10 +674,8 @@ def key_figures(run: Run) -> list[dict[str, str]]:
             at = dict(zip(one.value.dims, place, strict=True))
             here = one.isel(at)
             (reason,) = _reasons_at(here, {}, row)
-            # an event that did not happen is no key figure, nor is the place of a peak that is none
-            is_absent = reason in ("", row.absent, OPEN_THROUGHOUT) or name in PLACES
-            if here.is_missing and is_absent:
-                continue
+            if here.is_missing and _is_absent(reason, row):
+                continue  # no key figure
             if abs(here.value - column.dull) < _ROUNDING:
                 continue
             sample = str(about.get("over", ""))
@@ -726,17 +724,26 @@ def _places(places: Places, points: Points) -> Cells:
 
 
 def _says_something(means: Estimates, column: Column, points: Points) -> bool:
-    """Return True if a column is known and not constant at its dull value at these points, or if a step may hide it."""
+    """Return True if a column is known and not constant at its dull value at these points, or if a cause hides it."""
     if column.name not in means:
         return False
-    one = means[column.name]
-    if one.reason is not None and bool((_at(one.reason, points) == UNRESOLVED).any()):
-        return True
+    one, row = means[column.name], column.definition
     value, low, high = (_at(field, points) for field in (one.value, one.low, one.high))
-    if column.definition.form is not Form.PLAIN:
+    if row.form is not Form.PLAIN:
         value = np.where(np.abs(value) < _ROUNDING, 0.0, value)
     is_missing = np.isnan(value) & np.isnan(low) & np.isnan(high)
-    return not np.all((value == column.dull) | is_missing)
+    if not np.all((value == column.dull) | is_missing):
+        return True
+    reasons = _reasons_at(one, points, row)
+    return UNRESOLVED in reasons or any(
+        missing and not _is_absent(reason, row)
+        for missing, reason in zip(is_missing, reasons, strict=True)
+    )
+
+
+def _is_absent(reason: str, row: Definition) -> bool:
+    """Return True if a missing value is that of an event that did not happen, or the place of a peak that is none."""
+    return reason in ("", row.absent, OPEN_THROUGHOUT) or row.name in PLACES
 
 
 def _table_of(

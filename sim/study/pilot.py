@@ -5,6 +5,8 @@ A *name* is that of a quantity, for its mean over the members, or that of a quan
 
 Behind a spring or under a force single paths diverge, so means over the second half of the run are compared there.
 Times of events are compared in units of the duration, and a member without the event has it at the end of the run.
+Other numbers that only some members have, such as a pull-off load, are compared as means over these members. The share
+of these members is a name of its own, such as ``ever_detached``.
 """
 
 import math
@@ -74,6 +76,8 @@ class Sample(NamedTuple):
         The unit of errors: the largest mean of the run at this point of the sweep; of times the duration, of shares 1.
     energy : array, shape (members, numbers)
         ΔΓ/⟨ΔΓ⟩ − 1 of each member, 0 where the mean of ΔΓ is not known.
+    share : array, shape (names, numbers)
+        Share of the members that have a value; 0 if fewer than two have one.
     """
 
     mean: Array
@@ -81,6 +85,7 @@ class Sample(NamedTuple):
     members: Array
     unit: Array
     energy: Array
+    share: Array
 
 
 class Cost(NamedTuple):
@@ -228,7 +233,7 @@ class Pilots:
         numbers = 1 if driven else dataset.sizes["t"]
         means = [name for name in self.names if name in known and not driven]
         estimates = over_members(dataset, means, quantiles=False) if means else {}
-        rows = list[tuple[Array, Array, Array, Array]]()
+        rows = list[tuple[Array, ...]]()
         for name in self.names:
             quantity, _, statistic = name.partition(":")
             values = xr.DataArray(math.nan)  # an event that other points have
@@ -241,17 +246,18 @@ class Pilots:
             values = values.astype(float)
             if MEMBERS not in values.dims:
                 values = values.expand_dims({MEMBERS: self.members})
-            each = np.nan_to_num(values.transpose(MEMBERS, ...).to_numpy())
+            values = values.transpose(MEMBERS, ...)
+            if driven and "t" in values.dims:
+                values = values.isel(t=late).mean("t")
+            each = values.to_numpy()
             if each.ndim == 1:
                 each = np.repeat(each[:, np.newaxis], numbers, axis=1)
-            elif driven:
-                each = each[:, late].mean(axis=1, keepdims=True)
-            largest = np.abs(each.mean(axis=0)).max()
+            largest = np.abs(of_some(each, "")[0].mean(axis=0)).max()
             if quantity in TIMES:
                 largest = pilot.clock.duration
             elif statistic == "skewness" or _is_share(quantity):
                 largest = 1.0
-            each = influences(each, statistic)
+            each, share = of_some(each, statistic)
             mean, sem = each.mean(axis=0), each.std(axis=0, ddof=1)
             sem = np.where(np.ptp(each, axis=0) > 0.0, sem, 0.0)
             sem /= math.sqrt(self.members)
@@ -261,12 +267,12 @@ class Pilots:
                     np.nan_to_num(np.zeros(numbers) if part is None else part)
                     for part in (one.value, one.sem)
                 )
-            rows.append((mean, sem, each, np.full(numbers, largest)))
+            rows.append((mean, sem, each, np.full(numbers, largest), share))
         control, energy = control_variate(dataset), np.zeros((self.members, numbers))
         if control is not None and not driven:
             energy = control.deviation.transpose(MEMBERS, "t").to_numpy()
-        mean, sem, each, unit = map(np.array, zip(*rows, strict=True))
-        return Sample(mean, sem, each, unit, np.nan_to_num(energy))
+        mean, sem, each, unit, share = map(np.array, zip(*rows, strict=True))
+        return Sample(mean, sem, each, unit, np.nan_to_num(energy), share)
 
 
 def _check(names: Iterable[str], datasets: Iterable[xr.Dataset]) -> None:
@@ -321,11 +327,41 @@ def influences(values: Array, statistic: str) -> Array:
     return np.asarray(score**3 - 3.0 * score - 1.5 * third * (score**2 - 1.0))
 
 
+def of_some(values: Array, statistic: str) -> tuple[Array, Array]:
+    """Return ``influences`` of a statistic over the members that have a value, and the share of these members.
+
+    A member without a value (nan) has no influence. The influences are scaled so that the interval of their mean over
+    all members is that of Student's law for the members with a value. Of fewer than two such members there is no known
+    error, so that they count as none: the influences and the share are 0.
+
+    Examples
+    --------
+    >>> influence, share = of_some(np.array([[1.0], [3.0], [np.nan], [np.nan]]), "")
+    >>> print(influence.mean(), share)
+    2.0 [0.5]
+    """
+    known = np.isfinite(values)
+    members, count = len(values), known.sum(axis=0)
+    if known.all():
+        return influences(values, statistic), np.ones(count.shape)
+    result = np.zeros(values.shape)
+    for place in np.flatnonzero(count > 1):
+        some, number = known[:, place], count[place]
+        each = influences(values[some, place, np.newaxis], statistic)[:, 0]
+        # squares are divided by members - 1, and their sum by the members
+        scale = (members - 1.0) * members / ((number - 1.0) * number)
+        factor = float(students(number) / students(members)) * math.sqrt(scale)
+        result[:, place] = each.mean()
+        result[some, place] += factor * (each - each.mean())
+    return result, np.where(count > 1, count / members, 0.0)
+
+
 def difference(sample: Sample, reference: Sample, unit: Array) -> Array:
     """Return bounds of the differences of two samples and the noise in them, shape (2, names), in a ``unit``.
 
     Members have the same noise as far as the settings leave it, so that the differences of members may have the
-    smaller error; else it is that of the two means. Each bound is that at the time at which it is largest.
+    smaller error; else it is that of the two means. Each bound is that at the time at which it is largest. If only one
+    sample has members with a value, its mean counts by their share, because the other has no mean to compare.
     """
     count = sample.members.shape[1]
     paired = sample.members - reference.members
@@ -333,6 +369,9 @@ def difference(sample: Sample, reference: Sample, unit: Array) -> Array:
     apart = np.hypot(sample.sem, reference.sem)
     off = np.where(of_pairs < apart, paired.mean(axis=1), sample.mean - reference.mean)
     noise = students(count) * np.minimum(of_pairs, apart)
+    is_in_one = (sample.share == 0.0) ^ (reference.share == 0.0)
+    share = np.where(is_in_one, np.maximum(sample.share, reference.share), 1.0)
+    off, noise = share * off, share * noise
     parts = in_units(np.array([np.abs(off) + noise, noise]), unit)
     at = parts[0].argmax(axis=1)
     return np.array([part[np.arange(len(at)), at] for part in parts])

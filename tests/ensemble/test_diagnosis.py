@@ -13,6 +13,7 @@ import scipy
 from helpers.parts import (
     Adhesion,
     Clock,
+    Ensemble,
     Equilibrium,
     Time,
     jkr,
@@ -685,6 +686,16 @@ def test_a_pull_off_by_fluctuations_is_told_and_not_under_a_load_that_holds():
     # open and closed contacts are told apart between two of 256 energies
     shown = float(re.search(r"up to ([0-9.]+) %", text)[1])
     assert_allclose(shown, 100.0 * share, atol=100.0 / 256)
+    # new members exceed the limit later, and none of them closes again
+    assert "add up" in text
+    scene = small(
+        contact=Equilibrium(load=-0.1e-3, after_pull_off="stay_open"),
+        drive=AtSpeed(speed=10e-3),
+        **MASKED,
+    )
+    scene = replace(scene, ensemble=Ensemble(members=200))
+    opened = 1.0 - sim.run(scene)["in_contact"].mean("member")
+    assert float(opened[-1]) > share + 5.0 * math.sqrt(share * (1.0 - share) / 200.0)
     assert pulled_off(0.1e-3) == []
 
 

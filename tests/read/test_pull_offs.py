@@ -556,3 +556,80 @@ def test_the_error_of_the_load_at_pull_off_is_named_with_it_and_only_after_one(
     (text,) = words("-0.5 mN")
     assert "load at pull-off" in text
     assert words("0.5 mN") == []
+
+
+#: A load that is lowered at once and then held, over an edge that lags.
+LOWERED = {
+    "model": "rate_dependent",
+    "load": {
+        "time": ["0 s", "0.5 s", "0.5 s", "1 s"],
+        "value": ["1 mN", "1 mN", "-0.5 mN", "-0.5 mN"],
+    },
+    "front_speed": "50 um/s",
+    "front_exponent": 0.5,
+    "after_pull_off": "stop",
+}
+WAVES = {
+    "drive": {"model": "steady", "speed": "1 mm/s"},
+    "bonds": {"model": "steady", "stress": "0.2 MPa", "critical_speed": "5 mm/s"},
+    "shear": {
+        "model": "modal",
+        "points": 32,
+        "spectrum": {"model": "gaussian", "rms": "0.2 MPa", "length": "20 um"},
+        "correlation": {"model": "slip", "length": "50 um"},
+    },
+    "ensemble": {"members": 10},
+}
+#: A start from rest, in which each member has bonds of its own.
+STARTED = {
+    "drive": {"model": "start", "rest": "0.5 s", "speed": "2 mm/s"},
+    "bonds": {
+        "model": "tracked",
+        "sites": 50,
+        "rupture": {"model": "bell", "zero_force_rate": "1 1/s", "bell_force": "4 pN"},
+        "bond_stiffness": "0.8 uN/m",
+        "rebinding_rate": "5 1/s",
+        "site_density": "6.5e16 1/m^2",
+    },
+    "shear": {"model": "uniform"},
+    "ensemble": {"members": 4},
+}
+
+
+@pytest.mark.parametrize("per_member", [True, False])
+@pytest.mark.parametrize(
+    ("contact", "tables"),
+    [
+        (LOWERED, {}),
+        (LOWERED | {"load": {"from": "1 mN", "to": "-1 mN"}}, {}),
+        (LOWERED | {"load": {"from": "1 mN", "to": "-1 mN", "cycles": 2}}, {}),
+        ({"load": "4 mN"}, STARTED),
+    ],
+)
+def test_no_field_of_an_event_has_members_or_their_statistics(
+    contact, tables, per_member
+):
+    record = {"record": {"per_member": per_member}}
+    run = sim.Run(ran(LENS, contact, **WAVES | tables | record))
+    for name, one in run.events.items():
+        for field, values in zip(one._fields, one, strict=True):
+            dims = set() if values is None else {*values.dims}
+            assert not dims & {"member", "statistic"}, (name, field)
+    assert read.tables.tables_of(run)
+
+
+@pytest.mark.parametrize("per_member", [True, False])
+def test_a_load_that_is_borne_before_the_pull_off_has_no_error_of_the_step(per_member):
+    """Each member bears the lowest load for a while; on a falling load the pull-off is the lowest one."""
+    record = {"record": {"per_member": per_member}}
+    held = ran(LENS, LOWERED, **WAVES | record)
+    waits = held["pull_off_time"] - held["lowest_load_time"]
+    assert (waits if per_member else waits[0]).min() > 2e-3
+    stated = sim.Run(held).events
+    assert_allclose(stated["lowest_load"].value, -0.5e-3, rtol=1e-12)
+    assert not stated["lowest_load"].bound.fillna(0.0).any()
+    falling = {"load": {"from": "1 mN", "to": "-1 mN"}}
+    stated = sim.Run(ran(LENS, LOWERED | falling, **WAVES | record)).events
+    bounds = [stated[name].bound for name in ("lowest_load", "pull_off_load")]
+    assert_allclose(*bounds, rtol=1e-12)
+    assert float(bounds[0]) > 0.0

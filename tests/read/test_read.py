@@ -7,8 +7,21 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.lens import RADIUS, scene
-from helpers.parts import Clock, Equilibrium, Record, bonds, drive, read, run, shear
+from helpers.lens import FIELD, RADIUS, scene
+from helpers.parts import (
+    Band,
+    Clock,
+    Ensemble,
+    Equilibrium,
+    RateDependent,
+    Record,
+    Time,
+    bonds,
+    drive,
+    read,
+    run,
+    shear,
+)
 from helpers.printed import rows_of
 from helpers.statements import shares, statistics
 from numpy.testing import assert_allclose
@@ -76,11 +89,14 @@ def test_statistics_of_known_numbers_few_members_and_missing_values(known, ramp)
     assert_allclose(
         result["fraction_detached"].sem, math.sqrt(0.2 * 0.8 / 4.0), rtol=1e-14
     )
-    # member 0 has no work left, at t = 0 all that are closed have none
+    # member 0 has no work left, at t = 0 all four that are closed have none
     assert_allclose(
         result["fraction_masked"].value,
-        [0.8] + [0.2] * (known.sizes["t"] - 1),
+        [1.0] + [0.25] * (known.sizes["t"] - 1),
         rtol=1e-14,
+    )
+    assert_allclose(
+        result["fraction_masked"].sem[1:], math.sqrt(0.25 * 0.75 / 3.0), rtol=1e-14
     )
     result = statistics(ramp)
     np.testing.assert_array_equal(result["speed"].value, ramp["speed"])
@@ -128,6 +144,39 @@ def are_identical(group, other):
                 xr.testing.assert_identical(values, expected)
 
 
+@pytest.mark.parametrize("rule", ["stop", "stay_open", "reattach"])
+def test_a_masked_share_is_that_of_closed_contacts_and_missing_without_any(rule):
+    """A lagging edge bears a tension for a while in a masked contact, which an equilibrium contact cannot."""
+    load = {"time": [0.0, 0.1, 0.1, 0.4], "value": [1e-3, 1e-3, -5e-4, -5e-4]}
+    edge = {"front_speed": 5e-5, "front_exponent": 0.5}
+    waves = FIELD | {"spectrum": Band(rms=2e5, longest=60e-6, shortest=24e-6)}
+    members, recorded = (
+        run(
+            scene(
+                clock=Clock(duration=0.4, step=2e-3),
+                contact=RateDependent(load=load, after_pull_off=rule, **edge),
+                shear=shear.Modal(correlation=Time(time=0.05), **waves),
+                drive=Steady(speed=1e-2),
+                record=Record(per_member=per_member),
+                ensemble=Ensemble(members=20),
+            )
+        )
+        for per_member in (True, False)
+    )
+    flags, closed = (members[name] for name in ("masked", "in_contact"))
+    xr.testing.assert_equal(flags.isnull(), closed == 0)
+    count = closed.sum("member")
+    assert bool((count == 0).any()) and bool((count == 20).any())
+    expected = (flags == 1.0).sum("member") / count.where(count > 0)
+    spread = (expected * (1.0 - expected) / (count - 1.0).where(count > 1)) ** 0.5
+    some = (count > 0) & (count < 20)
+    assert bool(((expected > 0.0) & some).any())
+    for dataset in (members, recorded):
+        result = statistics(dataset)["fraction_masked"]
+        assert_allclose(result.value, expected, rtol=1e-12)
+        assert_allclose(result.sem, spread, rtol=1e-12)
+
+
 def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_members(
     ramp, tmp_path, monkeypatch
 ):
@@ -159,12 +208,6 @@ def test_recorded_statistics_and_those_of_files_and_pieces_are_those_of_the_memb
     for kind in ("value", "sem"):
         both = (getattr(of["lost_to_fluctuations"], kind) for of in (pooled, each))
         assert_allclose(*both, rtol=1e-10, atol=1e-14)
-    recorded = run(scene(record=Record(per_member=False)))
-    closed = recorded["in_contact"].copy()
-    closed[0, 3:6] = 0.5
-    result = read.observables(recorded.assign(in_contact=closed))["fraction_masked"]
-    result = result.sel(statistic="mean")
-    assert result.isnull().to_numpy().tolist() == [3 <= k < 6 for k in range(21)]
     path = run(scene(), to=tmp_path / "out.nc")
     with xr.open_dataset(path) as opened:
         are_identical(statistics(opened), statistics(ramp))

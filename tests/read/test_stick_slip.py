@@ -433,6 +433,37 @@ def test_slip_events_and_peaks_after_a_hold_are_told_apart_from_those_before_wha
     assert "static_friction" not in values_of(read.stick_slip(dataset))
 
 
+@pytest.mark.parametrize("jump", [0.8, 0.80005, 0.80015])
+@pytest.mark.parametrize("step", [2e-4, 5e-5])
+def test_a_slip_that_the_jump_of_a_load_sets_off_is_in_the_phase_that_it_begins(
+    jump, step
+):
+    """At a constant load there is no slip event; the jump to a quarter of it sets one off at once."""
+    load = {"time": [0.0, jump, jump, 1.8], "value": [4e-3, 4e-3, 1e-3, 1e-3]}
+    bonds = {
+        "model": "cohort",
+        "rupture": {"model": "bell", "zero_force_rate": 25.0, "bell_force": 4e-12},
+        "bond_stiffness": 8e-7,
+        "rebinding_rate": 250.0,
+        "site_density": 6.5e16,
+    }
+    scenario = {
+        "clock": {"duration": 1.8, "step": step, "record": 0.01},
+        "solid": {"shear_modulus": 1.6e6},
+        "sphere": {"radius": 2e-3},
+        "adhesion": {"work": 42e-3},
+        "contact": {"load": load},
+        "drive": {"model": "spring", "stage": 2e-4, "stiffness": 500.0},
+        "bonds": bonds,
+    }
+    dataset = sim.run(scenario)
+    assert_allclose(dataset["phase_start"], [0.0, jump], rtol=1e-12)
+    assert_allclose(dataset["slip_time"], jump, atol=2.0 * step)
+    assert_array_equal(read.slips_by_phase(dataset)["slip_count"], [0.0, 1.0])
+    held = sim.run(scenario | {"contact": {"load": 4e-3}})
+    assert float(held["slip_count"]) == 0.0
+
+
 @pytest.mark.parametrize(("length", "settles"), [("0.05 s", False), ("2.4 s", True)])
 def test_the_kinetic_friction_is_that_of_steady_sliding_and_absent_while_the_spring_extends(
     length, settles

@@ -459,3 +459,41 @@ def test_a_stress_of_finite_strains_is_noted_where_friction_builds_up_alone():
     dataset, strains = noted(**{"drive.speed": "10 um/s", "solid": bodies})
     ratio = float(dataset["shear_stress"].max()) / 1.6e6
     assert f"reaches {ratio:.2g} times the shear modulus" in strains[0]
+
+
+def test_a_quantity_that_exists_without_a_mean_keeps_its_column_with_the_reason():
+    """Sliding that has not settled yet has a kinetic friction, whose mean is not known; a slip event never came."""
+    scenario = {
+        "clock": {"duration": "1 s", "step": "2 ms"},
+        "solid": {"shear_modulus": "1.6 MPa"},
+        "sphere": {"radius": "2 mm"},
+        "adhesion": {"work": "42 mJ/m^2"},
+        "contact": {"load": "4 mN"},
+        "drive": {
+            "model": "spring",
+            "stage": "0.4 mm/s",
+            "stiffness": "300 N/m",
+            "damping": "10 mN s/m",
+        },
+        "bonds": {
+            "model": "cohort",
+            "start": "empty",
+            "rupture": {
+                "model": "bell",
+                "zero_force_rate": "1 1/s",
+                "bell_force": "4 pN",
+            },
+            "bond_stiffness": "0.8 uN/m",
+            "rebinding_rate": "5 1/s",
+            "site_density": "6.5e16 1/m^2",
+        },
+    }
+    run = sim.Run(sim.run(scenario))
+    assert run.events["kinetic_friction"].reason == "not settled"
+    printed = tables.tables_of(run)
+    names = [column.name for one in printed for column in one.columns]
+    assert "kinetic_friction" in names and "static_friction" not in names
+    reasons = [reason for one in printed for reason in one.reasons]
+    assert [
+        reason.text for reason in reasons if reason.heading == "kinetic friction"
+    ] == ["not settled"]

@@ -9,14 +9,16 @@ from helpers.accuracy_scenes import BAND, ONSET, RATE, SPRING, accuracy_scene
 from helpers.parts import Clock, Equilibrium, bonds, drive, shear
 from helpers.scenes import BELL, BONDS, CELL, DRIVES, SHEARS, STRETCHED, scene
 from numpy.testing import assert_allclose
+from scipy import stats
 
 import sim
 from sim.laws.schallamach import bell_stress, first_moment_stress
 from sim.parts.bonds.rupture import Bell
 from sim.parts.shear.process import Slip
 from sim.spectrum.families import SelfAffine
+from sim.study.accuracy import students
 from sim.study.converge import converge, explanation, figure, table
-from sim.study.pilot import influences, shown
+from sim.study.pilot import Pilots, difference, influences, of_some, shown
 from sim.study.within import Comparison, Goal, NotReached
 
 ROUGH = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=8e-6)
@@ -302,3 +304,52 @@ def test_a_name_that_is_not_known_is_refused():
     for name in ("no_quantity", "contact_area:kurtosis"):
         with pytest.raises(sim.BadInput, match=rf"accuracy\.of: {name}"):
             converge(scenario, 1.0, of=(name,))
+
+
+def test_a_number_of_some_members_is_compared_over_these_and_their_share_apart():
+    """At a dead load each member that pulls off does so at this load; the clock step decides how many do."""
+    scenario = {
+        "clock": {"duration": "0.4 s", "step": "5 ms", "record": "20 ms"},
+        "solid": {"youngs_modulus": "50 MPa"},
+        "sphere": {"radius": "1 um"},
+        "adhesion": {"work": "42 mJ/m^2"},
+        "contact": {"model": "cohesive", "load": "-0.05 uN", "range": "1 nm"},
+        "drive": {"speed": "0.3 mm/s"},
+        "bonds": {"model": "steady", "stress": "0.1 MPa", "critical_speed": "1 mm/s"},
+        "shear": {
+            "model": "modal",
+            "points": 32,
+            "spectrum": {"model": "gaussian", "rms": "7 MPa", "length": "20 nm"},
+            "correlation": {"model": "time", "time": "40 ms"},
+        },
+        "ensemble": {"members": 128},
+    }
+    names = "pull_off_load", "ever_detached"
+    pilots = Pilots(128, names, shown, 1e3)
+    coarse, fine = (
+        pilots[sim.load(scenario, {"clock.step": step})] for step in ("5 ms", "1.25 ms")
+    )
+    shares = coarse.share[0, 0], fine.share[0, 0]
+    assert_allclose(shares, [coarse.mean[1, 0], fine.mean[1, 0]], rtol=1e-12)
+    assert 0.02 < shares[0] < shares[1] < 0.98
+    load, share = difference(coarse, fine, fine.unit)[0]
+    assert_allclose(fine.unit[0], 50e-9, rtol=1e-12)
+    assert load == 0.0 and share > abs(shares[1] - shares[0]) > 0.0
+    # nothing is compared with a mean of no members but their share
+    none = fine._replace(mean=0.0 * fine.mean, share=0.0 * fine.share)
+    none = none._replace(members=0.0 * none.members, sem=0.0 * none.sem)
+    assert_allclose(difference(none, fine, fine.unit)[0, 0], shares[1], rtol=1e-9)
+
+
+def test_the_noise_of_a_mean_over_some_members_is_that_of_student_for_these():
+    values = np.random.default_rng(5).standard_normal((40, 1))
+    values[7:] = np.nan
+    influence, share = of_some(values, "")
+    assert share == 7 / 40
+    assert_allclose(influence.mean(), values[:7].mean(), rtol=1e-12)
+    half = students(40) * influence.std(ddof=1) / 40**0.5
+    few = stats.t.ppf(0.975, 6) * values[:7].std(ddof=1) / 7**0.5
+    assert_allclose(half, few, rtol=1e-9)
+    values[1:] = np.nan
+    influence, share = of_some(values, "")
+    assert not influence.any() and not share.any()
