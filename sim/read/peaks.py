@@ -158,7 +158,9 @@ def _rises_unseen(dataset: xr.Dataset, since: xr.DataArray) -> xr.DataArray:
     """
     stretched = _number_of(dataset, "bonds.bond_stiffness", 0.0) > 0.0
     step = setting(dataset, "clock.step")
-    return stretched & ((since < _TOO_FAST * step) | (step > _SHOWN * _life(dataset)))
+    return stretched & (
+        (ensemble_mean(since) < _TOO_FAST * step) | (step > _SHOWN * _life(dataset))
+    )
 
 
 def _life(dataset: xr.Dataset) -> xr.DataArray:

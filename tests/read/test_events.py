@@ -156,7 +156,7 @@ def test_openings_closings_and_masking_are_those_of_all_clock_steps_however_seld
             for turns, name in ((opens, "first_detachment"), (closes, "first_closing")):
                 first = np.where(turns.any(axis=1), t[1:][turns.argmax(axis=1)], NAN)
                 assert_allclose(dense[name], first, rtol=1e-12)
-            hidden = dense["masked"].values[:, 1:].sum(axis=1)
+            hidden = np.nansum(dense["masked"].values[:, 1:], axis=1)
             assert_allclose(
                 dense["time_masked"], hidden / closed[:, 1:].sum(axis=1), rtol=1e-12
             )
@@ -601,6 +601,22 @@ def test_a_clock_step_after_the_peak_of_a_start_states_no_static_threshold():
             assert bool(one.value.notnull()) is is_seen
         after = of_events(dataset)["phase_peak_after_hold"].isel({"phase": 1})
         assert bool(after.value.notnull()) is is_seen
+
+
+def test_recorded_statistics_of_a_threshold_keep_their_error():
+    """The error is the second of the recorded statistics, which a time of members had been compared with."""
+    scene = tomllib.loads(AGED)
+    scene["drive"] = {"model": "start", "rest": 0.5, "speed": 2e-3}
+    scene["bonds"] |= {"model": "tracked", "sites": 100}
+    scene |= {"clock": {"duration": 1.0, "step": 5e-3}, "ensemble": {"members": 4}}
+    each, pooled = (
+        of_events(run(sim.load(scene | {"record": {"per_member": kept}})))
+        for kept in (True, False)
+    )
+    for name in ("static_threshold", "area_at_threshold", "phase_peak_after_hold"):
+        ours, theirs = (np.ravel(one[name].sem)[-1] for one in (pooled, each))
+        assert ours > 0.0
+        assert_allclose(ours, theirs, rtol=1e-9, err_msg=name)
 
 
 @pytest.mark.parametrize("drive", ["start", "holds"])
