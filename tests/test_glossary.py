@@ -12,7 +12,8 @@ GLOSSARY = (DOCS / "glossary.md").read_text(encoding="utf-8")
 OTHERS = {"keys", "dataset", "commands", "api"}
 OTHERS |= {"changelog", "contributing", "security", "conduct"}
 #: Pages for developers and tables of sources, whose words are not those of the contact.
-APART = {"design", "reliability", "speed", "speed_rows", "precision", "literature"}
+APART = {"design", "reliability", "speed", "speed_rows", "precision", "within_rows"}
+APART |= {"literature"}
 
 
 def defined():

@@ -557,7 +557,7 @@ model = "table"
 file = "speeds.csv"
 [shear]
 model = "modal"
-points = 26
+points = 50
 spectrum = { model = "tabulated", file = "psd.csv", normalization = "in_density" }
 correlation = { model = "wave", waves = 2.0 }
 [[sweep]]
