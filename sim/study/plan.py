@@ -333,7 +333,7 @@ def plan(
 
 
 class _Asked(NamedTuple):
-    """What a plan is asked: its planned points and their table, rows of further points, and remarks on them."""
+    """Planned points of a plan and their table, rows of further points, and remarks on them."""
 
     base: Scenario
     table: Measured
