@@ -62,7 +62,7 @@ def test_a_notebook_shows_a_bar_that_moves_tables_a_picture_and_a_page():
         "import sim": "<td>contact.load</td><td>4 mN</td>",
         "sim.check": "<p>errors of the result</p><table>",
         "sim.read.tables_of": "<th>A/A_JKR (%)</th>",
-        "sim.stats": "<th>area_ratio</th>",
+        "sim.stats": "<th>contact_radius</th>",
         "sim.report": "&lt;h1&gt;Does the contact",
         "sim.methods": "@article{menga2018",
     }
