@@ -154,13 +154,12 @@ def check_waist(scenario, state, members):
     }
     for part, value in values.items():
         assert value.shape == ((members,) if scenario.varies[part] else (1,)), part
-    work = balance_of(scenario, state)
-    assert_allclose(
-        state.contact.work,
-        np.broadcast_to(work, state.contact.work.shape),
-        rtol=1e-13,
-        atol=1e-16,
-    )
+    work = np.broadcast_to(balance_of(scenario, state), state.contact.work.shape)
+    # a contact stays as it is when the motion of its slider ends
+    goes_on = np.ones(work.shape, bool)
+    if scenario.drive.solves_motion:
+        goes_on &= np.isfinite(state.drive.position)
+    assert_allclose(state.contact.work[goes_on], work[goes_on], rtol=1e-13, atol=1e-16)
     control = scenario.contact.control(
         scenario.times.at(state.step), scenario.clock.duration
     )
