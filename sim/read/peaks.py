@@ -166,7 +166,9 @@ def _rises_unseen(dataset: xr.Dataset, since: xr.DataArray) -> xr.DataArray:
 def _life(dataset: xr.Dataset) -> xr.DataArray:
     """Return the mean life of a bond at the last record of sliding [s]; nan if unknown.
 
-    As many form there as break. Bonds are taken to break rarely at rest, where they are the unit of their number.
+    As many bonds form there as break, so that their life follows from the bond fraction and the rate of rebinding. The
+    fraction is that of the bonds at rest, which are taken as all sites: where bonds break often at rest, the life that
+    is returned is too long.
     """
     if not {"bond_fraction", "speed"} <= {*dataset.variables}:
         return xr.DataArray(math.nan)
