@@ -231,6 +231,14 @@ def _masked_share(scene: Scenario, state: State) -> Any:
     )
 
 
+def _pull_off_error(scene: Scenario, state: State) -> Any:
+    """Return the bound of the error of the load at a member's first pull-off [N], nan without one."""
+    when = _first("pull_off_time")(scene, state)
+    return np.where(
+        np.isfinite(when), pull_off_error(scene, state.events.path, when), np.nan
+    )
+
+
 def _runaway_force(scene: Scenario, state: State) -> Any:
     drive, when = cast(Force, scene.drive), cast(Driven, state.drive).runaway_time
     return np.where(
@@ -427,11 +435,7 @@ LARGEST: tuple[Variable, ...] = (
     Variable(
         "pull_off_error",
         "contact",
-        lambda scene, state: np.where(
-            np.isfinite(_first("pull_off_time")(scene, state)),
-            pull_off_error(scene, state.events.path),
-            np.nan,
-        ),
+        _pull_off_error,
     ),
     *(of_phase for _, of_phase in _EVENTS),
     *(_slip(row.name) for row in OF_SLIPS),

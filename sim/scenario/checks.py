@@ -443,13 +443,14 @@ def renewed(scene: Scene, path: Array) -> Array:
     return np.asarray((scene.process.change(path, scene.clock.step) / all_of_it) ** 2)
 
 
-def pull_off_error(scene: Scene, path: Array) -> Array:
+def pull_off_error(scene: Scene, path: Array, when: Array | None = None) -> Array:
     """Return about how much the load at pull-off is off [N], as the contact is seen after clock steps with a path [m].
 
     The first passage of ΔΓ is detected late by the overshoot of its changes (Siegmund, Sequential Analysis, 1985). As a
     load this is 3/2 πR times the overshoot, or more on a layer and if adhesion has a range. A prescribed load adds half
-    of its largest change in a step. The two have opposite signs; this is a bound. An edge that lags is seen at the ends
-    of clock steps, between which its load falls by what the mount alone changes at most.
+    of its change in the step of the pull-off, which ends at the time ``when`` [s], or in any step if that is not given.
+    The two have opposite signs; this is a bound. An edge that lags is seen at the ends of clock steps, between which
+    its load falls by what the mount alone changes at most.
     """
     shear, clock, contact = scene.fluctuations, scene.clock, scene.contact
     late = np.zeros(1)
@@ -465,12 +466,7 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
         )
         change = scene.process.change(path, clock.step)
         late = _OVERSHOOT * shear.paid_by_adhesion * power * change
-    times = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
-    most = (
-        np.abs(np.diff(contact.course.at(times, clock.duration))).max()
-        * (len(times) - 1)
-        / clock.steps
-    )
+    most = _largest_change(scene, when)
     if contact.kind == "load":
         ramp = most if contact.lags else 0.5 * most
     elif contact.lags:
@@ -479,12 +475,29 @@ def pull_off_error(scene: Scene, path: Array) -> Array:
         mount = contact.stiffness or math.inf
         ramp = most * of_contact / (1.0 + of_contact / mount)
     else:
-        ramp = 0.0  # the fold is found within the step
+        ramp = np.zeros(1)  # the fold is found within the step
     work = scene.adhesion.work or 1.0
     once, twice = (
         contact.pull_off_load(each, scene.bodies) for each in (work, 2.0 * work)
     )
     return np.asarray((once - twice) / work * late + ramp)
+
+
+def _largest_change(scene: Scene, when: Array | None) -> Array:
+    """Return the largest change of the course of the contact in a clock step [N or m].
+
+    With times ``when`` [s] only the steps before and after each of them count: an edge that lags has its lowest load in
+    either.
+    """
+    clock, course = scene.clock, scene.contact.course
+    if when is None:
+        times = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
+        changes = np.abs(np.diff(course.at(times, clock.duration)))
+        return np.asarray([changes.max() * (len(times) - 1) / clock.steps])
+    last = np.ceil(when / clock.step - 1e-9)
+    around = np.stack([last - 1.0, last, last + 1.0][: 3 if scene.contact.lags else 2])
+    times = np.clip(around * clock.step, 0.0, clock.duration)
+    return np.asarray(np.abs(np.diff(course.at(times, clock.duration), axis=0)).max(0))
 
 
 def _remarks_on_step(scene: Scene, path: Array) -> list[str]:

@@ -137,6 +137,28 @@ def test_a_course_of_a_displacement_is_no_load():
     )
 
 
+@pytest.mark.parametrize("model", [{}, LAGGING])
+def test_only_the_change_of_the_load_near_a_pull_off_counts_for_its_error(model):
+    errors = []
+    for first in ("4 mN", "0.3 mN"):
+        course = {
+            "time": ["0 s", "0.1 s", "2.1 s"],
+            "value": [first, "0.2 mN", "-1 mN"],
+        }
+        lens = scene(
+            contact=model | {"load": course, "after_pull_off": "stop"},
+            clock=clock("2 ms") | {"duration": "2.1 s"},
+            ensemble={"members": 20},
+            shear=SCENE["shear"] | {"cell": "0.4 mm"},
+        )
+        dataset = sim.run(lens)
+        assert float(dataset["pull_off_time"].min()) > 0.11
+        errors.append(float(dataset["pull_off_error"].max()))
+    assert_allclose(*errors, rtol=1e-6)
+    # the load changes by 1.2 uN in a clock step, and by 76 uN in the first ones
+    assert 0.6e-6 < errors[0] < 10e-6
+
+
 def test_a_late_detachment_costs_3_pi_r_over_2_of_a_short_range_and_2_pi_r_of_a_long_one():
     mount = {"displacement": {"from": "1 um", "to": "-9 um"}, "stiffness": "1 kN/m"}
     path, costs = np.array([2e-6]), []
