@@ -590,7 +590,9 @@ def _with_start(before: Array, values: Array, steps: int) -> Array:
     """Values at the start of a block and at the end of each step, shape (steps + 1, rows)."""
     if values.ndim == 1:
         return during(values, steps + 1)
-    return np.concatenate([np.broadcast_to(before, (1, *values.shape[1:])), values])
+    result = np.empty((steps + 1, *values.shape[1:]))
+    result[0], result[1:] = before, values
+    return result
 
 
 @device

@@ -319,7 +319,9 @@ class Bonding(NamedTuple):
 
         ``radius`` is that of the contact at the start of the step [m], 0 or nan if it was open.
         """
-        is_closed = np.nan_to_num(radius) > 0.0
+        is_closed = radius > 0.0
+        if is_closed.all():
+            return self
         return Bonding(*(values * is_closed for values in self))
 
 

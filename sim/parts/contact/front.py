@@ -46,6 +46,8 @@ from sim.units.tables import Pieces
 
 #: Relative distance from equilibrium that rounding leaves.
 ROUNDING = 1e-12
+#: Share of a radius below which another one is no start for its search: Newton's first step would go far beyond.
+_FAR_BELOW = 1e-3
 
 
 @device
@@ -104,8 +106,11 @@ def hertz_force(a, scene):
 
 
 @device
-def hertz_radius(t, scene):
-    """Return Hertz's radius under the control at t; 0 if the control does not press."""
+def hertz_radius(near, t, scene):
+    """Return Hertz's radius under the control at t, sought from a radius ``near`` it; 0 if the control does not press.
+
+    A radius far below that without the mount's spring, such as 0 for an open contact, is not near.
+    """
     (curvature, modulus, inverse_thickness), force = scene.body, bare_force(t, scene)
     if not force > 0.0:
         return 0.0
@@ -115,15 +120,25 @@ def hertz_radius(t, scene):
             return start
     else:
         start = np.cbrt(0.75 * force / (curvature * modulus))
+    start = near if near > _FAR_BELOW * start else start
     load, base = scene.load + scene.load_rate * t, scene.base + scene.base_rate * t
     mount = load, base, scene.stiffness
     return largest_radius(start, 0.0, 0.0, mount, scene.body)[0]
 
 
 @device
-def pushed(t, scene, front):
-    """Return True if Hertz's contact at t grows faster than the edge heals, and its radius."""
-    a, stiffness, indenting = hertz_radius(t, scene), scene.stiffness, scene.base_rate
+def at_least_hertz(a, t, scene):
+    """Return a radius, or Hertz's at t if that is larger."""
+    if a > 0.0 and hertz_force(a, scene) >= bare_force(t, scene):
+        return a
+    return max(a, hertz_radius(a, t, scene))
+
+
+@device
+def pushed(a, t, scene, front):
+    """Return True if Hertz's contact at t grows faster than the edge heals, and its radius, sought from a radius a."""
+    stiffness, indenting = scene.stiffness, scene.base_rate
+    a = hertz_radius(a, t, scene)
     rate, _ = edge_speed(-(scene.work + scene.work_rate * t) / scene.scale, front)
     _, growth, _, contact_stiffness, _, _, _ = punch(a, scene.body)
     if stiffness < math.inf:
@@ -287,15 +302,15 @@ def _ride(t, a, end, least, scene, front):
     The energy is that of new area against G = 0, int w a da. Gauss's three points are exact because work and force are
     linear in time. None is counted for w <= 0, because pressing pays for the area.
     """
-    riding, b = pushed(end, scene, front)
+    riding, b = pushed(a, end, scene, front)
     if not riding:
         low, high = t, end
         for _ in range(60):
             middle = 0.5 * (low + high)
-            riding, _ = pushed(middle, scene, front)
+            riding, b = pushed(b, middle, scene, front)
             low, high = (middle, high) if riding else (low, middle)
         end = high
-        _, b = pushed(end, scene, front)
+        _, b = pushed(b, end, scene, front)
     if b <= least and b < a:
         b, before, after = min(a, least), bare_force(t, scene), bare_force(end, scene)
         end = t + (end - t) * min(
@@ -348,7 +363,7 @@ def _fallback(t, a, stop, least, scene, front):
             break
         energy += abs(s * high * (high - low))
         low = high
-    return max(low, hertz_radius(stop, scene)), energy
+    return at_least_hertz(low, stop, scene), energy
 
 
 @device
@@ -385,7 +400,7 @@ def _piece(t, a, stop, least, tries, scene, front):
         tries -= 1
         y, s, s_a, s_t = excess(t, a, scene)
         rate, bend = edge_speed(s, front)
-        if y <= _TOUCH * a * a * scene.body[0] and pushed(t, scene, front)[0]:
+        if y <= _TOUCH * a * a * scene.body[0] and pushed(a, t, scene, front)[0]:
             t, a, more = _ride(t, a, min(stop, t + tick), least, scene, front)
             energy, h = energy + more, 0.0
             if a <= least:
@@ -441,7 +456,7 @@ def _piece(t, a, stop, least, tries, scene, front):
             energy + more,
             False,
         )
-        a = max(a1, hertz_radius(t, scene)) if y1 < edge else a1
+        a = at_least_hertz(a1, t, scene) if y1 < edge else a1
         if running and whole:
             return t, 0.0, energy, tries
         h *= min(8.0, 0.9 * max(error, 1e-12) ** -0.25)
@@ -451,7 +466,7 @@ def _piece(t, a, stop, least, tries, scene, front):
 @device
 def _member(a, duration, least, scene, front):
     """Return radius or nan, time of detachment or nan, and dissipated energy of a member after a clock step."""
-    a = max(a, hertz_radius(0.0, scene))
+    a = at_least_hertz(a, 0.0, scene)
     if not a > 0.0:
         return math.nan, math.nan, 0.0
     ends = (bare_force(0.0, scene), bare_force(duration, scene))
@@ -617,7 +632,7 @@ def _moved(radius, touches, works, mount, duration, kinetics, bodies, spot):
     elif opens:
         lost += max(_energy(opened, 0.5 * spot, scene), 0.0)
     if touches:
-        lost += max(-_energy(0.0, max(spot, hertz_radius(0.0, scene)), scene), 0.0)
+        lost += max(-_energy(0.0, at_least_hertz(spot, 0.0, scene), scene), 0.0)
     return end, opened, lost
 
 

@@ -604,12 +604,13 @@ class Equilibrium(_Controlled):
         turn = np.full((*radius.shape, len(TURN.names or ())), np.nan)
         before = np.concatenate([state.radius[np.newaxis], radius[:-1]])
         is_open, was_open = np.isnan(radius), np.isnan(before)
-        opens, closes = is_open & ~was_open, was_open & ~is_open
+        has_been_open = is_open.any() or was_open.any()
         # on a layer a closed contact may have two stable radii
         leaps = np.zeros(radius.shape, bool)
         if balance.bodies.body[2] > 0.0:
             leaps = np.abs(radius - before) > _MAY_JUMP * before
-        if opens.any() or closes.any() or leaps.any():
+        if has_been_open or leaps.any():
+            opens, closes = is_open & ~was_open, was_open & ~is_open
             lost = np.zeros(radius.shape)
             left = np.concatenate(
                 [
@@ -628,7 +629,7 @@ class Equilibrium(_Controlled):
                         happens, start, motions, duration, balance
                     )
             dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
-        if is_open.any() or was_open.any():
+        if has_been_open:
             opened = np.where(opens, motions.time, np.nan)
             detached = np.fmax.accumulate(np.concatenate([detached[:1], opened]))[1:]
         work, phases = (
