@@ -9,9 +9,9 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
+import scipy
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
-from scipy import constants
 
 from sim.units.quantity import Quantity, keyed
 from sim.units.temperature import ModulusTable, absolute
@@ -49,7 +49,7 @@ class Arrhenius:
 
     def growth(self, temperature: float, reference: float) -> float:
         """Return the logarithm of the rate at a temperature over that at the reference, both in K [1]."""
-        return self.energy / constants.R * (1.0 / reference - 1.0 / temperature)
+        return self.energy / scipy.constants.R * (1.0 / reference - 1.0 / temperature)
 
     def fault(self, temperature: float, reference: float) -> str:
         return ""

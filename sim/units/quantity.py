@@ -323,7 +323,7 @@ class Quantity:
 @dataclass_transform(frozen_default=True, field_specifiers=(Field,))
 def keyed(kw_only: bool = False) -> Callable[[type[T]], type[T]]:
     """Return the decorator of a class whose fields are the keys of a table of a scenario."""
-    config = {"extra": "forbid", "populate_by_name": True}
+    config = {"extra": "forbid", "populate_by_name": True, "defer_build": True}
     return dataclasses.dataclass(frozen=True, kw_only=kw_only, config=config)  # type: ignore
 
 
