@@ -76,6 +76,7 @@ def half_space(radius, body):
 @device
 def circle(radius, body):
     """Return the terms of ``punch`` on a half-space under the profile of a circle; ``radius``: below R."""
+    apart()
     curvature, modulus, _ = body
     share = radius * curvature
     square, turn, load = share * share, math.atanh(share), 0.0

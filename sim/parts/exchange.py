@@ -150,10 +150,8 @@ class Draws(NamedTuple):
         Shape of a band's gamma number, and its energy for a number of 1 [J/m²].
     factors : array, shape (1,) or (bands,)
         Wavenumber of a band to the power of the correlation law; one if all bands have the same rate.
-    by_slip : bool
-        True if bands renew with the path, False if in time.
-    span : float
-        Distance [m] or time [s] in which a band of factor 1 keeps 1/e.
+    by_slip, by_time : float
+        Rates at which a band of factor 1 fades with the path [1/m] and with time [1/s]; one of them is 0.
     mean : float
         Mean of the energy at amplitude 1 [J/m²].
     relaxing : bool
@@ -169,8 +167,8 @@ class Draws(NamedTuple):
     shapes: Array = _EMPTY
     half_weight: Array = _EMPTY
     factors: Array = _EMPTY
-    by_slip: bool = True
-    span: float = 1.0
+    by_slip: float = 0.0
+    by_time: float = 0.0
     mean: float = 0.0
     relaxing: bool = False
     answers: bool = False

@@ -14,7 +14,7 @@ from sim.spectrum.radial import Terms, share_of
 
 #: Types of ``Draws`` and of ``StepEnds``.
 DRAWS = (
-    "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], boolean, float64, float64, "
+    "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], float64, float64, float64, "
     "boolean, boolean, Tuple((uint64, uint64, uint64[::1], int64))))"
 )
 ENDS = (
@@ -88,7 +88,7 @@ def _draw(state, m, k, duration, field, draws, room):
         half_weight,
         factors,
         by_slip,
-        span,
+        by_time,
         mean,
         relaxing,
         _,
@@ -102,7 +102,7 @@ def _draw(state, m, k, duration, field, draws, room):
         )
     if shapes.size > 0:
         keep, renew = room[0], room[1]
-        passed = (state.path if by_slip else duration) / span
+        passed = by_slip * state.path + by_time * duration
         for i in range(factors.size):
             keep[i], renew[i] = shares(factors[i] * passed)
         if relaxing:

@@ -527,7 +527,7 @@ class BandedProcess(Renewing):
             half_weight=self.half_weight,
             factors=factors(law, self.wavenumber),
             by_slip=law.by_slip,
-            span=law.span,
+            by_time=law.by_time,
             mean=self.mean,
             relaxing=self.amplitude.relaxing,
             answers=self._forgets_by_slip,

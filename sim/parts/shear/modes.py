@@ -477,7 +477,7 @@ class SiteModes(ModalProcess):
             noise.at(motions.step),
             energy,
         )
-        expected = state.energy if self.correlation.by_slip else energy[-1]
+        expected = state.energy if self.correlation.by_slip > 0.0 else energy[-1]
         return Fluctuation(energy[-1], sizes[:, -1].T, parts, expected=expected), energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:

@@ -270,22 +270,25 @@ Amplitude = Annotated[
 ]
 
 
-class _InTime:
-    """Attributes of correlations that fade at rest, too."""
+class _Renewal:
+    """Attributes of correlations. Those that fade by sliding only leave the pattern of a contact at rest."""
 
-    #: The rate goes with |q| to this power, and with the speed or not.
+    #: The rate goes with |q| to this power.
     power: ClassVar[int] = 0
-    by_slip: ClassVar[bool] = False
 
+    @property
+    def by_slip(self) -> float:
+        """Rate at which a mode fades with the slip, over its wavenumber to the power; 1/m for the power 0."""
+        return 0.0
 
-class _BySlip(_InTime):
-    """Attributes of correlations that fade by sliding only."""
-
-    by_slip: ClassVar[bool] = True
+    @property
+    def by_time(self) -> float:
+        """Rate at which a mode fades with time, over its wavenumber to the power; 1/s for the power 0."""
+        return 0.0
 
 
 @keyed()
-class Time(_InTime):
+class Time(_Renewal):
     """Modes renew in time: λ = 1/time."""
 
     time: Annotated[
@@ -294,13 +297,12 @@ class Time(_InTime):
     model: Literal["time"] = "time"
 
     @property
-    def span(self) -> float:
-        """Distance [m] or time [s] in which a mode keeps 1/e, times the wavenumber [rad/m] to the power."""
-        return self.time
+    def by_time(self) -> float:
+        return 1.0 / self.time
 
 
 @keyed()
-class Slip(_BySlip):
+class Slip(_Renewal):
     """Modes renew by sliding: λ = \\|V\\|/length, so a contact at rest keeps its pattern."""
 
     length: Annotated[
@@ -309,12 +311,12 @@ class Slip(_BySlip):
     model: Literal["slip"] = "slip"
 
     @property
-    def span(self) -> float:
-        return self.length
+    def by_slip(self) -> float:
+        return 1.0 / self.length
 
 
 @keyed()
-class Wave(_BySlip):
+class Wave(_Renewal):
     """A mode renews after sliding ``waves`` of its own wavelengths: λ = \\|V\\| q/(2π waves)."""
 
     power: ClassVar[int] = 1
@@ -328,12 +330,12 @@ class Wave(_BySlip):
     model: Literal["wave"] = "wave"
 
     @property
-    def span(self) -> float:
-        return 2.0 * np.pi * self.waves
+    def by_slip(self) -> float:
+        return 1.0 / (2.0 * np.pi * self.waves)
 
 
 @keyed()
-class Diffusion(_InTime):
+class Diffusion(_Renewal):
     """Modes diffuse away in time: λ = D q²."""
 
     power: ClassVar[int] = 2
@@ -344,8 +346,8 @@ class Diffusion(_InTime):
     model: Literal["diffusion"] = "diffusion"
 
     @property
-    def span(self) -> float:
-        return 1.0 / self.diffusivity
+    def by_time(self) -> float:
+        return self.diffusivity
 
 
 Correlation = Annotated[Time | Slip | Wave | Diffusion, Field(discriminator="model")]
@@ -356,8 +358,9 @@ def exponents(law: Correlation, wavenumber: Array, motion: Motion) -> Array:
 
     For a block of steps the step is the first axis.
     """
-    passed = motion.path if law.by_slip else motion.duration
-    return factors(law, wavenumber) * (passed / law.span)[..., np.newaxis]
+    by_slip, by_time = law.by_slip, law.by_time
+    passed = by_slip * motion.path if by_slip else by_time * motion.duration
+    return factors(law, wavenumber) * passed[..., np.newaxis]
 
 
 def factors(law: Correlation, wavenumber: Array) -> Array:
@@ -467,7 +470,7 @@ class Renewing:
 
     @cached_property
     def _forgets_by_slip(self) -> bool:
-        return self.correlation.by_slip or self.amplitude.remembers
+        return self.correlation.by_slip > 0.0 or self.amplitude.remembers
 
     @cached_property
     def mean(self) -> float:
@@ -496,9 +499,8 @@ class Renewing:
 
     @cached_property
     def field_law(self) -> FieldLaw:
-        law, rates = self.correlation, None
-        if law.power == 0:
-            rates = (1.0 / law.span, 0.0) if law.by_slip else (0.0, 1.0 / law.span)
+        law = self.correlation
+        rates = None if law.power else (law.by_slip, law.by_time)
         return self.amplitude.field_law(self.mean, rates)
 
     def _empty(self, members: int) -> Array:
