@@ -399,6 +399,10 @@ def remarks_between(scene: Scene) -> list[str]:
         remarks.append(
             'bonds continue to slide while the contact is open; bonds.area = "carried" starts without bonds'
         )
+    if contact.reversible * drive.viscosity > 0.0:
+        remarks.append(
+            "contact.reversible counts the stress of the bonds alone: that of drive.viscosity stores energy, too"
+        )
     if scene.temperature is not None:
         remarks += scene.temperature.remarks(scene.numbers)
     remarks += _remarks_on_theory(scene, scene.limits)

@@ -221,6 +221,11 @@ def test_limits_of_the_theory_and_of_the_cell_are_noted_once():
             {"sweep": {}, "shear.spectrum.amplitude": "3.2 MPa"},
             "the rms of the fluctuations is 1.41 times",
         ),
+        (
+            "pdms_lens_spring",
+            {"contact.reversible": 0.5, "drive.viscosity": "1 kPa s/m"},
+            "contact.reversible counts the stress of the bonds alone",
+        ),
     ):
         assert (
             sum(line.startswith(start) for line in blocks(name, **overrides)["notes"])
@@ -228,6 +233,8 @@ def test_limits_of_the_theory_and_of_the_cell_are_noted_once():
         ), start
     gentle = {"sweep": {}, "bonds.stress": "0.1 MPa"}  # 0.06 of the modulus
     assert not {"notes", "fluctuations"} & blocks("uniform_stress", **gentle).keys()
+    viscous = blocks("pdms_lens_spring", **{"drive.viscosity": "1 kPa s/m"})
+    assert not any("contact.reversible" in line for line in viscous["notes"])
     for cell, noted in ((CELL, False), (0.4 * CELL, True)):
         part = shear.Banded(spectrum=SPECTRUM, cell=cell, correlation=Slip(length=1e-6))
         assert ("longer than the cell" in preview(scene(shear=part))) == noted
