@@ -20,6 +20,7 @@ from sim.laws.schallamach import (
 )
 from sim.parts.bonds.models import Cohort, FirstMoment
 from sim.plots import curves, draw, style
+from sim.plots.slider import steady_law
 from sim.read import slips
 
 #: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.
@@ -277,3 +278,36 @@ def test_figures_of_a_slider_are_refused_with_the_cure_where_they_cannot_be_draw
     ):
         with pytest.raises(ValueError, match=cure):
             draw(driven(of), kind)
+
+
+def test_the_law_of_steady_sliding_is_that_of_the_bonds_and_the_viscosity_at_speeds_of_either_sign():
+    # bonds on sites: the fraction k/(k + V/l) of them bears the stress, and the viscosity adds 2 kPa s/m times V
+    tables = {
+        "clock": {"duration": "2 ms", "step": "1 ms"},
+        "solid": {"shear_modulus": "1.6 MPa"},
+        "sphere": {"radius": "2 mm"},
+        "contact": {"load": "4 mN"},
+        "adhesion": {"work": "42 mJ/m^2"},
+        "drive": {
+            "model": "spring",
+            "stage": "1 mm/s",
+            "stiffness": "1 kN/m",
+            "viscosity": "2 kPa s/m",
+            "contact_stiffness": "rigid",
+        },
+        "bonds": {
+            "model": "steady",
+            "stress": "0.1 MPa",
+            "critical_speed": "2 mm/s",
+        },
+        "sweep": {"bonds.stress": ["0.1 MPa", "0.3 MPa"]},
+    }
+    dataset, speed = sim.run(tables), np.array([-6e-3, -2e-3, 2e-3, 6e-3])
+    fraction = 1.0 / (1.0 + np.abs(speed) / 2e-3)
+    for place, strength in enumerate((1e5, 3e5)):
+        stress, bound = steady_law(dataset, {"bonds_stress": place}, speed)
+        assert_allclose(bound, fraction, rtol=1e-12)
+        exact = strength * fraction * np.sign(speed) + 2e3 * speed
+        assert_allclose(stress, exact, rtol=1e-12)
+    unread = dataset.drop_attrs()
+    assert np.isnan(steady_law(unread, {}, speed)).all()
