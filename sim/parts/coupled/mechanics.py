@@ -499,7 +499,9 @@ def retained(energy):
 @device
 def to_units(columns, spent, state, totals, units, work):
     """Convert a row and its energies to the units of the equations, at the start of a clock step."""
-    columns[:] = state / units
+    # loops, because array expressions fetch memory
+    for i in range(len(columns)):
+        columns[i] = state[i] / units[i]
     row = columns.view(ROW)[0]
     row.position, row.slip, row.path, row.recalled, row.renewed, row.substeps = (
         0.0,
@@ -534,10 +536,12 @@ def from_units(columns, spent, state, totals, units, work, pieces, stiffness):
             row.spring_force - before.spring_force / units_of.spring_force
         ) / stiffness
         row.position = pieces[:, 4].sum() - lengthened
-    state[:] = columns * units
+    for i in range(len(columns)):
+        state[i] = columns[i] * units[i]
     before.position += position
     before.substeps += substeps
-    totals[:_STORED] += spent[:_STORED] * work
+    for i in range(_STORED):
+        totals[i] += spent[i] * work
     totals[_STORED] = spent[_STORED] * work
 
 
