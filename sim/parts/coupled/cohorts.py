@@ -603,6 +603,89 @@ def _break_all(row, pool, place, slider, contact, law, books):
 
 
 @device
+def _try_step(row, pool, count, way, nodes, around, law):
+    """Take the nodes through a sub-step; ``way``: its start among them, its time, its length, and the unit of stretch.
+
+    Return the bonds at its end, less than 0 without any; how the speed changes there; the error over the tolerance; the
+    growth of the next step; and True if the step is good. ``around``: slider and contact.
+    """
+    (_, _, step, scale), (slider, contact) = way, around
+    new_count, factor = go_to_node(1, nodes, way, pool, count, row, around, law)
+    if new_count >= 0:
+        new_count, other = go_to_node(2, nodes, way, pool, new_count, row, around, law)
+        factor = min(factor, other)
+    bend, error = 0.0, math.inf
+    within = mechanics.within_reach(nodes[2].slip, step, row, contact)
+    if new_count >= 0:
+        bend, error = bend_of(nodes, step, scale, row, slider)
+    grows = (
+        min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0)))
+        if error > 0.0
+        else min(factor, 4.0)
+    )
+    is_good = error <= 1.0 and factor >= 1.0 and within >= 1.0
+    return new_count, bend, error, min(grows, 0.9 * within), is_good
+
+
+@device
+def _let_go(row, pool, count, place, slider, contact, law, books):
+    """Let bonds go at their limit where a brief sub-step is refused; return the bonds left, less than 0 if none goes.
+
+    ``place``: time, length of the sub-step, and the slip that is tried ahead.
+    """
+    (time, step, ahead), (unit, rules), new_count = place, law, -1
+    is_held = slider.mass + slider.damping > 0.0
+    if is_brittle(row, slider):
+        new_count = _slip_event(
+            row, pool, count, (time, ahead), slider, contact, law, books
+        )
+    if new_count < 0 and (is_held or slider.viscosity > 0.0):
+        reach = _AROUND * step * math.fabs(row.speed) + _TRIED * rules.limit / unit
+        new_count = _break_stretched(
+            row, pool, count, (time, reach), slider, contact, law, books
+        )
+    return new_count
+
+
+@device
+def _slip_or_break(row, pool, count, place, slider, contact, law, books):
+    """Let the interface slip, or bonds break, where no sub-step is short enough.
+
+    Return the bonds left, less than 0 if nothing can go at once, and True if all of them have broken. ``place``: time,
+    and the length of the piece. ``books``: the node there, and the energies.
+    """
+    (time, length), (unit, rules), (node, energy) = place, law, books
+    slid, row.next_step = row.slip, 0.0
+    # the speed grows beyond all bounds before the force falls by a stretch that is resolved
+    if rules.limit < math.inf and is_brittle(row, slider):
+        within_a_cell = time, 0.5 * rules.cell / unit
+        left = _slip_event(row, pool, count, within_a_cell, slider, contact, law, books)
+        if left >= 0:
+            row.next_step = 1e-6 * length
+            return left, False
+    brief = time, mechanics.BRIEF * length
+    if _break_all(row, pool, brief, slider, contact, law, books):
+        return 1, True
+    if rules.limit == math.inf and mechanics.snap(
+        row, node.square, time, slider, contact, energy
+    ):
+        for i in range(count):
+            pool[1, i] += unit * (row.slip - slid)
+        sums_at(pool, count, unit, rules, node)
+        row.acceleration = 0.0
+        return count, False
+    return -1, False
+
+
+@device
+def is_brittle(row, slider):
+    """True if nothing delays a slip of the interface: neither viscosity, nor a body that is held and does not yield."""
+    yields, _ = mechanics.compliance(row.radius, slider)
+    is_held = slider.mass + slider.damping > 0.0
+    return slider.viscosity == 0.0 and (yields > 0.0 or not is_held)
+
+
+@device
 def _piece(line, bonds, slider, contact, law, room, books):
     """Go through one piece of a clock step; return the time reached, before its end if the motion ends, and the bonds.
 
@@ -615,93 +698,46 @@ def _piece(line, bonds, slider, contact, law, room, books):
     start, length, turns, checked = 0.0, slider.length, 0, 0.0
     # the energies of the bonds are good to their own tolerance
     balanced = mechanics.Slider(*slider[:-1], max(slider.tolerance, rules.tolerance))
-    is_held = slider.mass + slider.damping > 0.0
-    yields, _ = mechanics.compliance(row.radius, slider)
-    brittle = slider.viscosity == 0.0 and (yields > 0.0 or not is_held)
     sums_at(pool, count, unit, rules, nodes[0])
     while turns >= 0:
         turns, checked = mechanics.judged(turns, checked, start, length)
-        left = length - start
+        left, slid = length - start, row.slip
         step = mechanics.next_step(row, left, length, longest(row, unit, rules))
         if left <= mechanics.LEAST * length:
             return length, count, travelled, settled, contact.stays
         if not step > mechanics.LEAST * length:
-            slid, row.next_step = row.slip, 0.0
-            place = start, mechanics.BRIEF * length
-            at_here = nodes[0], energy
-            # the speed grows beyond all bounds before the force falls by a stretch that is resolved
-            new_count, within_a_cell = -1, (start, 0.5 * rules.cell / unit)
-            if rules.limit < math.inf and brittle:
-                new_count = _slip_event(
-                    row, pool, count, within_a_cell, slider, contact, law, at_here
-                )
+            place, at_here = (start, length), (nodes[0], energy)
+            new_count, all_break = _slip_or_break(
+                row, pool, count, place, slider, contact, law, at_here
+            )
             if new_count >= 0:
-                count, row.next_step = new_count, 1e-6 * length
+                count, settled = new_count, 1 if all_break else settled
                 travelled += unit * (row.slip - slid)
-            elif _break_all(row, pool, place, slider, contact, law, at_here):
-                count = settled = 1
-                travelled += unit * (row.slip - slid)
-            elif rules.limit == math.inf and mechanics.snap(
-                row, nodes[0].square, start, slider, contact, energy
-            ):
-                for i in range(count):
-                    pool[1, i] += unit * (row.slip - slid)
-                travelled += unit * (row.slip - slid)
-                sums_at(pool, count, unit, rules, nodes[0])
-                row.acceleration = 0.0
             elif contact.stays > 0.0:
                 return start, count, travelled, settled, contact.stays
             else:
                 # the interface slips with the body from there on, however fast the contact was lost
-                contact, row.speed, row.acceleration = (
-                    mechanics.later(contact, 0.0, 1.0),
-                    row.body_speed,
-                    0.0,
-                )
+                contact = mechanics.later(contact, 0.0, 1.0)
+                row.speed, row.acceleration = row.body_speed, 0.0
             continue
         saved[:, :count] = pool[:3, :count]
         first, contact = nodes[0], mechanics.following(contact, row, start, step)
         at_start = begin_sub_step(row, first, start, slider, contact)
-        scale = stretch_scale(row, first, slider)
-        way, around = (at_start, start, step, scale), (slider, contact)
-        new_count, factor = go_to_node(1, nodes, way, pool, count, row, around, law)
-        if new_count >= 0:
-            new_count, other = go_to_node(
-                2, nodes, way, pool, new_count, row, around, law
-            )
-            factor = min(factor, other)
-        shift, bend, error = nodes[2].slip, 0.0, math.inf
-        within = mechanics.within_reach(shift, step, row, contact)
-        if new_count >= 0:
-            bend, error = bend_of(nodes, step, scale, row, slider)
-        grows = (
-            min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0)))
-            if error > 0.0
-            else min(factor, 4.0)
+        way = at_start, start, step, stretch_scale(row, first, slider)
+        new_count, bend, error, grows, is_good = _try_step(
+            row, pool, count, way, nodes, (slider, contact), law
         )
-        grows = min(grows, 0.9 * within)
-        if not (error <= 1.0 and factor >= 1.0 and within >= 1.0):
+        shift = nodes[2].slip
+        if not is_good:
             pool[:3, :count] = saved[:, :count]
             row.next_step = step * (grows if error < math.inf else 0.25)
             if rules.limit < math.inf and step < mechanics.BRIEF * length:
-                slid, reach = (
-                    row.slip,
-                    _AROUND * step * math.fabs(row.speed) + _TRIED * rules.limit / unit,
+                # a slip that stays as the step shrinks may be shorter than what is tried
+                stays = 0.5 * math.fabs(shift) if error < math.inf else 1.0
+                place = start, step, min(_TRIED * rules.limit / unit, stays)
+                new_count = _let_go(
+                    row, pool, count, place, slider, contact, law, (first, energy)
                 )
-                new_count = -1
-                if brittle:
-                    # a slip that stays as the step shrinks may be shorter than what is tried
-                    stays = 0.5 * math.fabs(nodes[2].slip) if error < math.inf else 1.0
-                    ahead = min(_TRIED * rules.limit / unit, stays)
-                    place, at_here = (start, ahead), (first, energy)
-                    new_count = _slip_event(
-                        row, pool, count, place, slider, contact, law, at_here
-                    )
-                if new_count < 0 and (is_held or slider.viscosity > 0.0):
-                    place, at_here = (start, reach), (first, energy)
-                    new_count = _break_stretched(
-                        row, pool, count, place, slider, contact, law, at_here
-                    )
                 if new_count >= 0:
                     count, row.next_step = new_count, 1e-6 * length
                     travelled += unit * (row.slip - slid)
