@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.numerics.noise import Noise
 from sim.parts.contact.balance import Bodies
@@ -31,6 +32,7 @@ from sim.parts.exchange import (
     Storing,
     Times,
 )
+from sim.units.tables import Pieces
 
 _NAMES = ROW.names or ()
 #: Fields of the state of a slider that are columns of a row.
@@ -194,45 +196,29 @@ def advance(
     they are drawn at its end, with the slip in it.
     """
     drive, slider = cast(Force | Spring, parts.drive), cast(Driven, slider)
-    bonds = population_of(parts)
-    ends, members = (
-        times.at(np.arange(steps.start - 1.0, steps.stop)),
-        len(slider.speed),
-    )
+    bonds, members = population_of(parts), len(slider.speed)
+    ends = times.at(np.arange(steps.start - 1.0, steps.stop))
     units = bonds.units(drive, contact.area, times.step)
     stretch, force = units
-    rows = np.zeros(members, ROW)
-    for name in _SHARED:
-        rows[name] = getattr(slider, name)
-    if steps.start == 1 and not drive.spring:  # a force acts at once
-        rows["spring_force"] = 0.0
-    rows["radius"], rows["parted"] = contact.radius, contact.has_parted
-    rows["closed"] = (slider.radius == 0.0) & (contact.radius > 0.0) & (steps.start > 1)
-    pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
-    scale = 1.0 / (stretch if drive.spring else force)
-    course = np.stack(
-        [
-            pieces.interval,
-            pieces.stop - pieces.start,
-            *(scale * piece for piece in pieces[3:6]),
-        ],
-        axis=1,
-    )
-    law, shear = parts.shear.field_law, contact.shear
-    rows["paid"], rows["drawn"] = contact.paid, contact.paid * shear.energy
+    pieces, law = drive.driven(ends, times.duration), parts.shear.field_law
     # others hold a contact that is rigid
-    answers = bonds.bonds.stretched and shear.expected.size
-    rows["felt"] = contact.paid * (shear.expected if answers else shear.energy)
+    answers = bool(bonds.bonds.stretched and contact.shear.expected.size)
+    is_pulled, begins = bool(drive.spring), steps.start == 1
+    rows = _rows_at_start(slider, contact, begins, is_pulled, answers)
     if law.length < math.inf:
-        for name, values in shear.past._asdict().items():
+        for name, values in contact.shear.past._asdict().items():
             rows[name] = values if values.size else law.energy
         law = law._replace(length=law.length / stretch, by_slip=law.by_slip * stretch)
     draws = step_ends.draws
-    draws = draws._replace(answers=draws.answers and bool(answers))
-    state = rows.view(float).reshape(members, COLUMNS)
-    clock, work = _clock(contact, ends), stretch * force
+    draws = draws._replace(answers=draws.answers and answers)
+    course = _course(pieces, 1.0 / (stretch if drive.spring else force))
     inputs = Inputs(
-        state, slider.energies.copy(), course, clock, _of_columns(*units), work
+        rows.view(float).reshape(members, COLUMNS),
+        slider.energies.copy(),
+        course,
+        _clock(contact, ends),
+        _of_columns(*units),
+        stretch * force,
     )
     columns, energies = (
         np.empty((COLUMNS, len(steps), members)),
@@ -246,34 +232,25 @@ def advance(
         (columns, energies),
         (tuple(draws), *step_ends[1:]),
     )
-    loop = Loop(inputs, arguments, reached)
-    end, bonding = bonds.advance(population, contact.radius, loop, noise)
+    end, bonding = bonds.advance(
+        population, contact.radius, Loop(inputs, arguments, reached), noise
+    )
     if bonds.bonds.feeds_back:
         bonding = bonding.carried(contact.radius)
-    stage, stage_speed = np.zeros((2, len(steps), members))
+    stage = stage_speed = np.zeros((len(steps), members))
     if drive.spring:
-        whole = pieces.joined
-        stage[:], stage_speed[:] = (
-            whole.integral[:, np.newaxis],
-            whole.last[:, np.newaxis],
-        )
-        stage[0] += slider.stage_position
-        np.add.accumulate(stage, out=stage)
+        stage, stage_speed = _stage(slider, pieces)
     shared = {name: reached[name] for name in _SHARED}
     after = Driven(
         **shared, stage_position=stage, stage_speed=stage_speed, energies=energies
     )
-    first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
-    way = duration[:, np.newaxis], reached["slip"], reached["path"], first, after.speed
     field = FieldCourse(draws=draws)
     if law.length < math.inf:
         field = FieldCourse(Memory(*(reached[name] for name in Memory._fields)), draws)
-    motions = Motion(
-        steps.start,
-        ends[1:, np.newaxis],
-        *way,
-        position=after.position,
-    )
+    first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
+    duration = (ends[1:] - ends[:-1])[:, np.newaxis]
+    way = duration, reached["slip"], reached["path"], first, after.speed
+    motions = Motion(steps.start, ends[1:, np.newaxis], *way, position=after.position)
     at_ends = step_ends.radius if step_ends.follows else after.radius
     radii = np.fmax(from_start(contact.radius, at_ends), 0.0)
     stick_ends = bonds.stick_ends(
@@ -287,6 +264,44 @@ def advance(
     bonding = bonding._replace(stress=bonding.stress + viscous)
     lost = (reached["lost"] > 0.0) & contact.undisturbed
     return Reached(after, motions, end, bonding, field, lost)
+
+
+def _rows_at_start(
+    slider: Driven, contact: StepContact, begins: bool, is_pulled: bool, answers: bool
+) -> NDArray[np.void]:
+    """Return the rows from which sliders go on; ``begins``: at t = 0, where a force acts at once.
+
+    A slider ``is_pulled`` by a spring, which takes it along. If it ``answers`` to what was drawn, it feels the mean of
+    the field until then.
+    """
+    rows = np.zeros(len(slider.speed), ROW)
+    for name in _SHARED:
+        rows[name] = getattr(slider, name)
+    if begins and not is_pulled:
+        rows["spring_force"] = 0.0
+    rows["radius"], rows["parted"] = contact.radius, contact.has_parted
+    rows["closed"] = (slider.radius == 0.0) & (contact.radius > 0.0) & (not begins)
+    shear = contact.shear
+    rows["paid"], rows["drawn"] = contact.paid, contact.paid * shear.energy
+    rows["felt"] = contact.paid * (shear.expected if answers else shear.energy)
+    return rows
+
+
+def _course(pieces: Pieces, scale: float) -> Array:
+    """Return the pieces of what is prescribed, a row each: interval, duration, and values times a scale."""
+    values = (scale * piece for piece in pieces[3:6])
+    return np.stack([pieces.interval, pieces.stop - pieces.start, *values], axis=1)
+
+
+def _stage(slider: Driven, pieces: Pieces) -> tuple[Array, Array]:
+    """Return the positions [m] and speeds [m/s] of the stages at the end of each clock step."""
+    whole, members = pieces.joined, len(slider.speed)
+    moved, speed = (
+        np.repeat(values[:, np.newaxis], members, axis=1)
+        for values in (whole.integral, whole.last)
+    )
+    moved[0] += slider.stage_position
+    return np.add.accumulate(moved), speed
 
 
 def with_contact(
