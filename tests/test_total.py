@@ -338,6 +338,13 @@ def test_a_random_scene_closes_its_energy_and_has_the_same_numbers_however_it_is
     assert check_scene(seed) is not None or seed in REFUSED
 
 
+def test_an_open_slider_goes_along_with_a_stage_that_turns_back():
+    """In the 65th clock step its speed is a rounding of zero, and so is each slip that is tried."""
+    scenario = admitted(corner_scene(540))
+    _, course = run(scenario, [0], range(67))
+    assert np.isnan(column(course, "unresolved_time")[-1]).all()
+
+
 def test_an_overhang_of_merged_bonds_breaks_however_short_the_slip():
     """In the third clock step it slips by 6e-8 of their limit, which is less than the slip that is tried."""
     scenario = admitted(random_scene(7248))

@@ -416,6 +416,10 @@ def _slide(line, start, slider, along, contact, nodes, books):
             )
         # too long for a speed that grows from nearly zero
         if stops and not nodes.slip[2] * along.sense > 0.0:
+            if not step > mechanics.LEAST * length:
+                # the speed is a rounding of zero, and so is the slip
+                row.speed = row.body_speed = row.next_step = 0.0
+                return start, True
             row.next_step = 0.25 * step
             continue
         line[1], books[1] = row, energy
