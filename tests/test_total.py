@@ -345,6 +345,21 @@ def test_an_open_slider_goes_along_with_a_stage_that_turns_back():
     assert np.isnan(column(course, "unresolved_time")[-1]).all()
 
 
+def test_a_contact_comes_off_whose_carried_bonds_are_too_few_for_its_area():
+    """In the first clock step the area grows 24-fold, so that the bonds that it carries do not hold it in the second.
+
+    The sphere comes off then. It touches again where the second cycle of its mount begins, without bonds and hence as
+    at the start.
+    """
+    scenario = admitted(corner_scene(691))
+    _, course = run(scenario, [0], range(scenario.clock.steps + 1))
+    is_open = np.isnan(course.radius[:, 0])
+    assert np.isnan(column(course, "unresolved_time")[-1]).all()
+    assert list(np.flatnonzero(np.diff(is_open))) == [1, 9, 11, 19]
+    np.testing.assert_allclose(course.radius[10, 0], course.radius[0, 0], rtol=1e-9)
+    check_energy(scenario, course)
+
+
 def test_an_overhang_of_merged_bonds_breaks_however_short_the_slip():
     """In the third clock step it slips by 6e-8 of their limit, which is less than the slip that is tried."""
     scenario = admitted(random_scene(7248))

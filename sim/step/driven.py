@@ -167,6 +167,7 @@ class Driven(Stepper):
             draws,
             self.follows,
             contact.after_pull_off == "reattach",
+            scene.models.bonds.feeds_back,
             mounts,
             jumps,
             touches,

@@ -854,15 +854,29 @@ def elastic(row, time, slider, contact, energy):
 
 
 @device
+def _held_up(row, slider, contact, energy):
+    """Return ``elastic`` at the start of a piece, and the contact; one that is lost by that keeps its radius.
+
+    Bonds that an area dilutes, a force that jumps, or a draw of ΔΓ may leave no equilibrium. As within a piece, the
+    interface goes on to the end of the clock step, where the contact opens.
+    """
+    going = elastic(row, 0.0, slider, contact, energy)
+    if not going and contact.stays == 0.0:
+        contact = later(contact, 0.0, 1.0)
+        going = elastic(row, 0.0, slider, contact, energy)
+    return going, contact
+
+
+@device
 def answer(row, piece, slider, contact, energy):
     """Slip at once at the start of a piece; return True if possible, and the contact then.
 
     At the start of a clock step ΔΓ has been drawn: the answer to the difference from its mean is no sliding path.
     """
-    going = elastic(row, 0.0, slider, contact, energy)
+    going, contact = _held_up(row, slider, contact, energy)
     if piece == 0 and row.felt != row.drawn:
         path, row.felt, contact = row.path, row.drawn, drawn(contact, row, piece)
-        going = elastic(row, 0.0, slider, contact, energy)
+        going, contact = _held_up(row, slider, contact, energy)
         row.path = path
     return going, contact
 

@@ -18,7 +18,7 @@ DRAWS = (
     "boolean, boolean, Tuple((uint64, uint64, uint64[::1], int64))))"
 )
 ENDS = (
-    f"Tuple(({DRAWS}, boolean, boolean, float64[:, ::1], boolean[::1], boolean[::1], float64[::1], float64, "
+    f"Tuple(({DRAWS}, boolean, boolean, boolean, float64[:, ::1], boolean[::1], boolean[::1], float64[::1], float64, "
     f"{SHARE}, float64[:, ::1]))"
 )
 
@@ -36,6 +36,8 @@ class StepEnds(NamedTuple):
         True if load or displacement of the base jump there.
     again : bool
         True if a contact that has pulled off closes again as the free sphere touches.
+    starts_empty : bool
+        True if a contact that closes has no bonds yet, because it carries its bonds with it.
     mounts : array, shape (steps, 2)
         Load [N] and displacement of the base [m] at the end of each step, after a jump there.
     touches : array, shape (steps,)
@@ -53,6 +55,7 @@ class StepEnds(NamedTuple):
     draws: Draws
     follows: bool
     again: bool
+    starts_empty: bool
     mounts: Array
     jumps: Flags
     touches: Flags
@@ -63,14 +66,14 @@ class StepEnds(NamedTuple):
 
 
 @device
-def _equilibrium(row, load, base, energy, contact, share):
+def _equilibrium(row, bonds, load, base, energy, contact, share):
     """Return the largest stable radius in equilibrium with the ``energy`` that fluctuations take, nan without one.
 
-    The energy is that for many waves in the contact.
+    ``bonds``: their share bound and the sum of their stretches. The energy is that for many waves in the contact.
     """
     start = row.radius if row.radius > 0.0 else math.sqrt(contact.area / math.pi)
-    bonded, tilt = contact.bare + contact.bonded * row.bound, contact.mean_stress
-    tilt *= row.moment * row.moment
+    bonded, tilt = contact.bare + contact.bonded * bonds[0], contact.mean_stress
+    tilt *= bonds[1] * bonds[1]
     mount = load, base, contact.stiffness
     body = contact.curvature, contact.modulus, contact.inverse_thickness
     most = bonded if len(share[2]) > 0 else bonded - energy
@@ -131,7 +134,19 @@ def end_step(row, columns, m, k, duration, contact, ends, room):
     [SI], with which the next step begins. ``contact`` is as at the start of the step, ``room`` for the shares of all
     factors, shape (2, factors).
     """
-    draws, follows, again, mounts, jumps, touches, energies, paid, share, radii = ends
+    (
+        draws,
+        follows,
+        again,
+        starts_empty,
+        mounts,
+        jumps,
+        touches,
+        energies,
+        paid,
+        share,
+        radii,
+    ) = ends
     if not follows:
         return
     state, has_draws = columns.view(mechanics.ROW)[0], len(draws[0]) > 0
@@ -144,8 +159,10 @@ def end_step(row, columns, m, k, duration, contact, ends, room):
     if not (is_open or jumps[k] or has_draws) and is_reached:
         radius = row.radius
     elif not is_open or (touches[k] and (again or row.parted == 0.0)):
+        has_none = is_open and starts_empty
+        bonds = (0.0, 0.0) if has_none else (row.bound, row.moment)
         radius = _equilibrium(
-            row, mounts[k, 0], mounts[k, 1], paid * drawn, contact, share
+            row, bonds, mounts[k, 0], mounts[k, 1], paid * drawn, contact, share
         )
         # a sphere that touches without adhesion and without load has a contact of no size
         radius = 0.0 if touches[k] and math.isnan(radius) else radius
