@@ -1394,7 +1394,7 @@ def _walk(
     variance = float(weights @ best.covariance @ weights)
     spread = min(math.sqrt(variance), room)
     side, near = math.copysign(1.0, bound - value), abs(float(weights @ start) - value)
-    stiffness = _STIFFNESS / spread
+    stiffness, along = _STIFFNESS / spread, weights / (weights @ weights)
 
     @functools.cache
     def above(distance: float) -> float:
@@ -1408,6 +1408,12 @@ def _walk(
 
             drawn = replace(problem, spring=spring)
             result = minimum(drawn, start, precision=_END_SQUARES)
+            if result.chi_square - best.chi_square >= rise**2:
+                # a search that the spring draws may stop on its way; another one begins at the aim
+                moved = start + (value + step - float(weights @ start)) * along
+                moved = np.clip(moved, *np.transpose(problem.bounds))
+                other = minimum(drawn, moved, precision=_END_SQUARES)
+                result = min(result, other, key=lambda item: item.chi_square)
             start = result.x
             off = spring(start)
             root = math.sqrt(max(result.chi_square - off**2 - best.chi_square, 0.0))

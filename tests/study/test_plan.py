@@ -340,6 +340,23 @@ def test_an_interval_reaches_to_values_that_another_explanation_leaves_possible(
     assert not likelihood.interval(sharp, best, k).low_open
 
 
+@pytest.mark.parametrize("draw", [15, 17, 31])
+def test_an_interval_has_no_end_where_a_search_for_it_stops_on_its_way(tmp_path, draw):
+    # its sum of squares rises steadily to the bound, by less than the level
+    path = points(tmp_path / "points.csv", BELOW_ONSET, 3.0)
+    problem = problem_of(load(SPRUNG), path, AREA_KEYS)
+    (values,) = itertools.islice(
+        drawn(problem, problem.values, draw + 1, 1), draw, None
+    )
+    data, k = replace(problem, values=values), AREA_KEYS.index("shear.spectrum.rms")
+    best, item = likelihood.lowest(data), problem.free[k]
+    bonds = replace(data, free=data.free[:k], fixed={item.key: item.low})
+    rise = likelihood.lowest(bonds).chi_square - best.chi_square
+    assert 0.0 < rise < stats.chi2.ppf(likelihood.LEVEL, 1)
+    result = likelihood.interval(data, best, k)
+    assert result.low == item.low and result.low_open and not result.high_open
+
+
 @pytest.mark.verify
 @pytest.mark.parametrize(
     ("changes", "speeds", "error", "names", "keys"),
