@@ -426,17 +426,27 @@ class Events(NamedTuple):
     path: Array
     slips: Slips
 
-    def next_phase(self, after_rest: bool) -> "Events":
-        """Return the events at the start of another phase; a first maximum is looked for anew ``after_rest``."""
+    def next_phase(self, since: float, after_rest: bool) -> "Events":
+        """Return the events at the start of another phase; a first maximum is looked for anew ``after_rest``.
+
+        Turns of the contact ``since`` some time [s] belong to the phase that starts. They may have been found in the
+        clock step before, within which the phase starts, or at whose end the mount jumps.
+        """
         contact, rise = self.contact[:, -1:].copy(), self.rise[:, -1:]
-        contact[..., _OPENING:] = np.nan
+        ended = self.contact.copy()
+        for turn, first in ((_PULL_OFF, _OPENING), (_JUMP_IN, _CLOSING)):
+            is_late = contact[:, 0, turn] >= since
+            for column in (first, *range(turn, turn + len(TURN.names or ()))):
+                ended[is_late, -1, column] = np.nan
+                contact[~is_late, 0, column] = np.nan
         if after_rest:
             # a rest that ends within a clock step is followed to the end of that step
             before, last = self.friction[:, -1, :2].T
             rise = _rising(np.where(before < last, np.maximum(before, 0.0), last))
         ahead = *(_started(rows[:, -1, 1]) for rows in self[:3]), contact, rise
+        so_far = *self[:3], ended, self.rise
         phases = (
-            np.concatenate(pair, axis=1) for pair in zip(self[:5], ahead, strict=True)
+            np.concatenate(pair, axis=1) for pair in zip(so_far, ahead, strict=True)
         )
         return Events._make([*phases, self.path, self.slips])
 

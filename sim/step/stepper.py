@@ -6,6 +6,7 @@ A scene has one stepper, ``Prescribed`` or ``Driven``, which it chooses once.
 """
 
 import bisect
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,9 @@ BLOCK_NUMBERS = 2**16
 _LARGEST_ARRAY = 2**19
 #: Mode pairs of a shear process whose step takes much longer than the rest.
 _MANY_PAIRS = 64
+#: Share of the run by which the time of a turn may differ from that of the jump that makes it: courses jump at a time
+#: that is nearer than half of it.
+_SAME = 2e-9
 
 
 class Models(NamedTuple):
@@ -180,8 +184,9 @@ class Stepper:
         """Return the events after a block of clock steps."""
         history, phases = state.events, self.scene.phases
         if steps.start in phases.steps[1:]:
-            before = phases.steps.index(steps.start) - 1
-            history = history.next_phase(phases.rests[before])
+            phase = phases.steps.index(steps.start)
+            since = self._first_turn(phases.starts[phase])
+            history = history.next_phase(since, phases.rests[phase - 1])
         return events.after(
             history,
             (state.bonding, state.contact.radius),
@@ -192,6 +197,16 @@ class Stepper:
             self.scene.follows_path,
             self.scene.shares_area,
         )
+
+    def _first_turn(self, start: float) -> float:
+        """Return the time since which turns of the contact belong to a phase with a start [s].
+
+        A turn at its very start belongs to it only if the mount jumps there.
+        """
+        times, course = self.scene.times, self.scene.models.contact.course
+        if course.jumps(np.array([start]), times.duration).any():
+            return start - _SAME * times.duration
+        return math.nextafter(start, math.inf)
 
     def _pull(self, time: float | Array, touch: ContactState) -> Array:
         """Return the tensile load of the contact [N] if the control makes it, else nothing."""

@@ -194,5 +194,5 @@ def test_a_friction_that_only_falls_has_no_first_maximum_and_a_rest_begins_anoth
     maxima = followed(falls)
     assert np.isnan(maxima.first_maximum(0)["largest"])
     for after_rest, start in ((True, 1.0), (False, 3.0)):
-        ahead = maxima.next_phase(after_rest).rise[0, :, 0]
+        ahead = maxima.next_phase(2.0, after_rest).rise[0, :, 0]
         assert_allclose(ahead, [3.0, start], rtol=1e-14)

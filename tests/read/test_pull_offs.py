@@ -633,3 +633,32 @@ def test_a_load_that_is_borne_before_the_pull_off_has_no_error_of_the_step(per_m
     bounds = [stated[name].bound for name in ("lowest_load", "pull_off_load")]
     assert_allclose(*bounds, rtol=1e-12)
     assert float(bounds[0]) > 0.0
+
+
+@pytest.mark.parametrize("late", [0.0, 0.006, 0.014])
+@pytest.mark.parametrize(
+    "drive",
+    [{"speed": "1 um/s"}, {"model": "spring", "stage": "1 um/s", "stiffness": 10.0}],
+    ids=["prescribed", "spring"],
+)
+def test_a_pull_off_that_the_jump_of_a_load_makes_is_in_the_phase_that_it_begins(
+    drive, late
+):
+    """The load jumps at or between the ends of clock steps beyond the pull-off, and back to a press."""
+    down, up = 10.0 + late, 15.0 + late
+    times, press, pull = [0.0, down, down, up, up, 20.0], -DEAD, 3.0 * DEAD
+    load = {"time": times, "value": [press, press, pull, pull, press, press]}
+    rupture = {"model": "bell", "zero_force_rate": 1.0, "bell_force": 4e-12}
+    bonds = {
+        "model": "rate",
+        "rupture": rupture,
+        "bond_stiffness": 1e-6,
+        "rebinding_rate": 10.0,
+        "site_density": 1e16,
+    }
+    contact = {"load": load, "after_pull_off": "reattach"}
+    dataset = sim.run(PROBE | {"contact": contact, "drive": drive, "bonds": bonds})
+    assert_allclose(dataset["phase_start"], [0.0, down, up], rtol=1e-12)
+    assert_allclose(dataset["phase_pull_off_time"], [np.nan, down, np.nan], rtol=1e-8)
+    assert_allclose(dataset["pull_off_time"], down, rtol=1e-8)
+    assert_allclose(dataset["jump_in_time"], up, atol=0.02)
