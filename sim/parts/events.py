@@ -408,6 +408,27 @@ def _follow_slips(times, samples, half, factor, running, late, log):
     return ends
 
 
+class Jumps(NamedTuple):
+    """True if the stress jumps, and if the contact area and the pull do."""
+
+    stress: bool
+    area: bool
+
+
+NO_JUMPS = Jumps(False, False)
+
+
+class Followed(NamedTuple):
+    """What is followed in a block of steps: the path, the area at the largest stress, and jumps in the last step.
+
+    Members that share a stress may differ in the area at its largest.
+    """
+
+    path: bool = False
+    area: bool = True
+    jumps: Jumps = NO_JUMPS
+
+
 class Events(NamedTuple):
     """Events so far; NaN counts as 0 in a maximum; ties keep the first.
 
@@ -426,11 +447,12 @@ class Events(NamedTuple):
     path: Array
     slips: Slips
 
-    def next_phase(self, since: float, after_rest: bool) -> "Events":
+    def next_phase(self, since: float, after_rest: bool, jumps: Jumps) -> "Events":
         """Return the events at the start of another phase; a first maximum is looked for anew ``after_rest``.
 
         Turns of the contact ``since`` some time [s] belong to the phase that starts. They may have been found in the
-        clock step before, within which the phase starts, or at whose end the mount jumps.
+        clock step before, within which the phase starts, or at whose end the mount jumps. A value that ``jumps`` as the
+        phase starts has not begun as the phase before has left it.
         """
         contact, rise = self.contact[:, -1:].copy(), self.rise[:, -1:]
         ended = self.contact.copy()
@@ -443,7 +465,12 @@ class Events(NamedTuple):
             # a rest that ends within a clock step is followed to the end of that step
             before, last = self.friction[:, -1, :2].T
             rise = _rising(np.where(before < last, np.maximum(before, 0.0), last))
-        ahead = *(_started(rows[:, -1, 1]) for rows in self[:3]), contact, rise
+        jump = jumps.stress, jumps.stress or jumps.area, jumps.area
+        starts = (
+            np.where(is_other, np.nan, rows[:, -1, 1])
+            for is_other, rows in zip(jump, self[:3], strict=True)
+        )
+        ahead = *map(_started, starts), contact, rise
         so_far = *self[:3], ended, self.rise
         phases = (
             np.concatenate(pair, axis=1) for pair in zip(so_far, ahead, strict=True)
@@ -532,13 +559,12 @@ def after(
     contact: ContactState,
     pull: Array,
     motions: Motion,
-    with_path: bool = False,
-    with_area: bool = True,
+    followed: Followed,
 ) -> Events:
     """Return the events after a block of steps in one phase, from bonds, contact and pull [N] at the end of each.
 
-    ``before`` are bonds and contact radius at its start. The path is followed only ``with_path``, the area at the
-    largest stress only ``with_area``: members that share a stress may differ in it.
+    ``before`` are bonds and contact radius at its start. What jumps in the last step keeps its value before the step in
+    the maxima of the phase, because the phase ends there.
 
     Notes
     -----
@@ -587,11 +613,13 @@ def after(
         (stress, stiffness, relaxation),
         (radii, pull, contact.work, contact.detached, contact.turn),
         ends,
-        (1.0 * with_area, 1.0 * bent),
+        (1.0 * followed.area, 1.0 * bent, *np.multiply(1.0, followed.jumps)),
         tuple(values[:, -1] for values in now),
     )
     path = (
-        np.maximum(so_far.path, motions.path.max(axis=0)) if with_path else so_far.path
+        np.maximum(so_far.path, motions.path.max(axis=0))
+        if followed.path
+        else so_far.path
     )
     return Events._make([*now, path, so_far.slips])
 
@@ -623,26 +651,31 @@ def _load(k, i, stress, stiffness, relaxation, speed, radius):
 
 @kernel(
     f"void(Tuple(({3 * _READ})), Tuple(({4 * _READ}{_READ_ROWS})), Tuple(({4 * _READ}{2 * 'float64[:], '})),"
-    f" UniTuple(float64, 2), UniTuple(float64[:, :], 5))"
+    f" UniTuple(float64, 4), UniTuple(float64[:, :], 5))"
 )
 def _follow(bonds, contacts, motion, traits, events):
     """Follow the events through a block of clock steps, in place.
 
     ``bonds``: stress, its stiffness and its relaxation; with the radii and ``motion`` as ``after`` has them.
     ``contacts``: radii, pulls, works of adhesion, times of detachment, turns. ``traits``: 1 if the area at the largest
-    stress is followed, 1 if bonds have no stretch. ``events``: the present rows of the first five of ``Events``.
+    stress is followed, 1 if bonds have no stretch, and 1 if the stress, or the area, jumps in the last step.
+    ``events``: the present rows of the first five of ``Events``.
     """
     radii, pulls, works, detached, turns = contacts
     first, speed, strengths, since, times, steps = motion
     stress, friction, pull, contact, rises = events
-    (share, bent), none = traits, (0.0, math.nan, 0.0)
+    (share, bent, stress_jumps, area_jumps), none = traits, (0.0, math.nan, 0.0)
     for k in range(len(times)):
-        time, step = times[k], steps[k]
+        time, step, is_last = times[k], steps[k], k == len(times) - 1
         for i in range(len(friction)):
             strength, place = _of(strengths, k, i), _of(since, k, i) / step
             speeds = _of(first, k, i), _of(speed, k, i)
             value0, slope0, area0 = _load(k, i, *bonds, speeds[0], radii)
             value1, slope1, area1 = _load(k + 1, i, *bonds, speeds[1], radii)
+            ends = value1, value1 * area1
+            if is_last and stress_jumps > 0.0:
+                value1, slope1 = value0, slope0
+            area1 = area0 if is_last and area_jumps > 0.0 else area1
             around = time, step, speeds[0], speeds[1], area0, area1
             if i < len(stress):
                 # an open contact has none to leave out
@@ -671,6 +704,10 @@ def _follow(bonds, contacts, motion, traits, events):
             _keep(value1 * area1, rise, slope, around, kink, friction, i)
             if rises[i, 1] == 0.0:
                 _rise(friction, rises, i)
+            if is_last and stress_jumps + area_jumps > 0.0 and ends[1] >= 0.0:
+                # with which the next phase starts
+                friction[i, 1] = ends[1]
+                stress[i if i < len(stress) else 0, 1] = ends[0]
         for i in range(len(pull)):
             if math.isnan(_of(first, k, i)):  # the motion had ended before
                 continue
@@ -679,7 +716,10 @@ def _follow(bonds, contacts, motion, traits, events):
                 math.pi * _of(radii, k + 1, i) ** 2,
             )
             around = time, step, _of(first, k, i), _of(speed, k, i), area0, area1
-            _keep(_of(pulls, k, i), math.nan, math.nan, around, none, pull, i)
+            now, before = _of(pulls, k, i), pull[i, 1]
+            held = before if is_last and area_jumps > 0.0 else now
+            _keep(held, math.nan, math.nan, around, none, pull, i)
+            pull[i, 1] = 0.0 if math.isnan(now) else now
         for i in range(len(contact)):
             radius, work, opening = (
                 _of(radii, k + 1, i),
@@ -764,7 +804,8 @@ def _keep(now, rise, slope, around, kink, maxima, i):
     peak, back = -math.inf, 0.0
     # max compiles for long
     steepest, larger = rise if rise > -slope else -slope, last if last > now else now
-    if rise > 0.0 > slope and step * steepest < _RESOLVED * larger:
+    is_known = not math.isnan(last)
+    if is_known and rise > 0.0 > slope and step * steepest < _RESOLVED * larger:
         peak, back = _top(last, now, step * rise, step * slope)
     elif (
         bent == 0.0

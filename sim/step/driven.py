@@ -70,6 +70,15 @@ class Driven(Stepper):
         history = self._first_events(bonding, touch, drive.stage_of(slider))
         return State(0, slider, bonds, bonding, shear, touch, history)
 
+    @property
+    def _moves_stress(self) -> frozenset[str]:
+        """Courses with which the stress jumps where nothing delays the slip; the stage of a spring never jumps."""
+        drive = cast(Force | Spring, self.scene.parts.drive)
+        is_viscous = drive.damping + drive.viscosity > 0.0
+        if drive.mass > 0.0 or (is_viscous and not self.scene.models.bonds.jumps_with):
+            return frozenset()
+        return frozenset({"mount"} if drive.spring else {"mount", "drive"})
+
     def _block(
         self, state: State, noise: MemberNoise, steps: range
     ) -> tuple[State, Trajectory]:

@@ -20,13 +20,14 @@ class Phases(NamedTuple):
     """Phases of a run: their starts [s], names, and the first clock step of each.
 
     ``slows`` is True for each phase in which the prescribed motion gets slower, or begins slower than before or in the
-    other direction.
+    other direction. ``jumps`` has the names of the courses that jump where a phase starts, ``drive`` and ``mount``.
     """
 
     starts: tuple[float, ...]
     names: tuple[str, ...]
     steps: tuple[int, ...]
     slows: tuple[bool, ...]
+    jumps: tuple[frozenset[str], ...]
 
     @property
     def rests(self) -> tuple[bool, ...]:
@@ -49,13 +50,13 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
     of_drive = {0.0: steady, 1.0: f"increasing {words}", -1.0: f"decreasing {words}"}
     of_contact = {0.0: f"constant {kind}", 1.0: "approach", -1.0: "retraction"}
     starts = sorted({*moved, *pressed})
-    result: dict[int, tuple[float, str, bool]] = {}
+    result: dict[int, tuple[float, str, bool, frozenset[str]]] = {}
     for start in starts:
         place = [max(at for at in course if at <= start) for course in (moved, pressed)]
-        sense, trend, jump = moved[place[0]]
+        now = moved[place[0]]
         names = [
-            "rest" if sense == 0.0 else of_drive[trend],
-            of_contact[pressed[place[1]][1]],
+            "rest" if now.sense == 0.0 else of_drive[now.trend],
+            of_contact[pressed[place[1]].trend],
         ]
         shown = [
             name
@@ -65,22 +66,35 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
         # the first whose middle is later
         step = math.floor(start / times.step + 0.5) + 1
         if step <= times.steps:
-            slows = trend < 0.0 or (start in moved and jump < 0.0)
-            result[step] = start, ", ".join(shown or names[:1]), slows
+            slows = now.trend < 0.0 or (start in moved and now.gain < 0.0)
+            of = zip(("drive", "mount"), (moved, pressed), strict=True)
+            jumps = frozenset(
+                name for name, course in of if start in course and course[start].jumps
+            )
+            result[step] = start, ", ".join(shown or names[:1]), slows, jumps
     steps = sorted(result)[:_MOST_PHASES]
     columns: Any = zip(*(result[step] for step in steps), strict=True)
-    begins, titles, slowing = columns
-    return Phases(begins, titles, tuple(steps), slowing)
+    begins, titles, slowing, jumping = columns
+    return Phases(begins, titles, tuple(steps), slowing, jumping)
 
 
-def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float, float]]:
-    """Return the starts of intervals [s] in which a course keeps its sense and its trend, with both, and its jump.
+class _Turn(NamedTuple):
+    """What a course does from a time on: its sense and its trend, and its change at that time, if it ``jumps``.
 
-    The sense of a course that is not ``signed`` is 1; the trend of one that is that of its magnitude. The jump is how
+    The sense of a course that is not signed is 1; the trend of one that is that of its magnitude. The ``gain`` is how
     much the value at the start exceeds the one before, in the sense of the latter.
     """
+
+    sense: float
+    trend: float
+    gain: float
+    jumps: bool
+
+
+def _turns(pieces: Pieces, signed: bool) -> dict[float, _Turn]:
+    """Return the starts of intervals [s] in which a course keeps its sense and its trend."""
     largest = max(np.abs(pieces.first).max(), np.abs(pieces.last).max())
-    result: dict[float, tuple[float, float, float]] = {}
+    result: dict[float, _Turn] = {}
     before, value = (math.nan, math.nan), math.nan
     for start, stop, first, last in zip(*pieces[1:5], strict=True):
         crossing = (
@@ -102,6 +116,7 @@ def _turns(pieces: Pieces, signed: bool) -> dict[float, tuple[float, float, floa
             )
             jumps = abs(low - value) > _SAME * largest
             if now != before or jumps:
-                result[float(at)] = (*now, (low - value) * before[0] if jumps else 0.0)
+                gain = (low - value) * before[0] if jumps else 0.0
+                result[float(at)] = _Turn(*now, gain, bool(jumps))
             before, value = now, high
     return result

@@ -98,6 +98,11 @@ class Stepper:
         self.scene, self.longest = scene, longest
         _have_memory_kept()
 
+    @property
+    def _moves_stress(self) -> frozenset[str]:
+        """Courses with which the stress jumps, see ``Phases``."""
+        return self.scene.models.bonds.jumps_with
+
     def start(self, noise: MemberNoise) -> State:
         """Return the state of a batch of members at t = 0."""
         raise NotImplementedError
@@ -182,11 +187,14 @@ class Stepper:
         contact: ContactState,
     ) -> events.Events:
         """Return the events after a block of clock steps."""
-        history, phases = state.events, self.scene.phases
+        scene, history, phases = self.scene, state.events, self.scene.phases
         if steps.start in phases.steps[1:]:
             phase = phases.steps.index(steps.start)
-            since = self._first_turn(phases.starts[phase])
-            history = history.next_phase(since, phases.rests[phase - 1])
+            since, jumps = self._first_turn(phase), self._jumps(steps.start)[1]
+            history = history.next_phase(since, phases.rests[phase - 1], jumps)
+        followed = events.Followed(
+            scene.follows_path, scene.shares_area, self._jumps(steps.stop)[0]
+        )
         return events.after(
             history,
             (state.bonding, state.contact.radius),
@@ -194,19 +202,33 @@ class Stepper:
             contact,
             self._pull(motions.time, contact),
             motions,
-            self.scene.follows_path,
-            self.scene.shares_area,
+            followed,
         )
 
-    def _first_turn(self, start: float) -> float:
-        """Return the time since which turns of the contact belong to a phase with a start [s].
+    def _first_turn(self, phase: int) -> float:
+        """Return the time since which turns of the contact belong to a phase [s].
 
         A turn at its very start belongs to it only if the mount jumps there.
         """
-        times, course = self.scene.times, self.scene.models.contact.course
-        if course.jumps(np.array([start]), times.duration).any():
-            return start - _SAME * times.duration
-        return math.nextafter(start, math.inf)
+        phases, near = self.scene.phases, _SAME * self.scene.times.duration
+        start = phases.starts[phase]
+        is_jump = "mount" in phases.jumps[phase]
+        return start - near if is_jump else math.nextafter(start, math.inf)
+
+    def _jumps(self, first: int) -> tuple[events.Jumps, events.Jumps]:
+        """Return what jumps where a phase with a first clock step starts: in the step before, and from its end on.
+
+        A mount that jumps at the end of a step has jumped there, and a drive has not.
+        """
+        scene, phases = self.scene, self.scene.phases
+        if first not in phases.steps[1:]:
+            return events.NO_JUMPS, events.NO_JUMPS
+        phase, near = phases.steps.index(first), _SAME * scene.times.duration
+        late = phases.starts[phase] - scene.times.at(first - 1)
+        names = phases.jumps[phase]
+        stress, area = bool(names & self._moves_stress), "mount" in names
+        early = events.Jumps(stress and late < -near, area and late <= near)
+        return early, events.Jumps(stress and not early.stress, area and not early.area)
 
     def _pull(self, time: float | Array, touch: ContactState) -> Array:
         """Return the tensile load of the contact [N] if the control makes it, else nothing."""

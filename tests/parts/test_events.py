@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sim.parts import events
 from sim.parts.exchange import Bonding, ContactState, Motion
 
+FOLLOWED = events.Followed()
 ONE = np.full(1, 1.0 / np.sqrt(np.pi))  # radius of a contact of unit area
 
 
@@ -54,7 +55,7 @@ def _after(maxima, bondings, radii, step, number):
     # the radius jumps at the beginning of a step: only the last row of a block is its end
     ends = np.repeat(radii[1][None], steps, axis=0)
     start, pull = (bondings[0], radii[0]), bonding.stress
-    return events.after(maxima, start, bonding, contact(ends), pull, motions)
+    return events.after(maxima, start, bonding, contact(ends), pull, motions, FOLLOWED)
 
 
 def stress(*course):
@@ -194,5 +195,5 @@ def test_a_friction_that_only_falls_has_no_first_maximum_and_a_rest_begins_anoth
     maxima = followed(falls)
     assert np.isnan(maxima.first_maximum(0)["largest"])
     for after_rest, start in ((True, 1.0), (False, 3.0)):
-        ahead = maxima.next_phase(2.0, after_rest).rise[0, :, 0]
+        ahead = maxima.next_phase(2.0, after_rest, events.NO_JUMPS).rise[0, :, 0]
         assert_allclose(ahead, [3.0, start], rtol=1e-14)

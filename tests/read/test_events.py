@@ -993,3 +993,79 @@ def test_a_contact_without_adhesion_has_none_to_mask(work, is_stated):
     assert ("fraction_masked" in sim.stats(dataset)) is is_stated
     if is_stated:
         assert dataset["first_masked"].item() == 0.0
+
+
+@pytest.mark.parametrize("late", [0.0, 0.006, 0.014])
+def test_the_peaks_of_a_phase_are_those_between_jumps_of_speed_and_load(late):
+    """Steady bonds, speeds of 10, 1 and 20 µm/s and loads of 2, 1 and 3 µN: a stress by the law, an area by JKR."""
+    radius, work, modulus, times = 10e-6, 0.05, 4e6 / 3.0, [1.0 + late, 2.0 + late]
+    speeds, loads = np.array([1e-5, 1e-6, 2e-5]), np.array([2e-6, 1e-6, 3e-6])
+    time = [0.0, *np.repeat(times, 2), 3.0]
+    dataset = sim.run(
+        {
+            "clock": {"duration": 3.0, "step": 0.02},
+            "solid": {"shear_modulus": modulus / 4.0},
+            "sphere": {"radius": radius},
+            "adhesion": {"work": work, "bond_share": 0.0},
+            "contact": {"load": {"time": time, "value": list(np.repeat(loads, 2))}},
+            "drive": {"model": "table", "time": time, "speed": [*np.repeat(speeds, 2)]},
+            "bonds": {"model": "steady", "stress": 1e4, "critical_speed": 1e-5},
+        }
+    )
+    stress = 1e4 / (1.0 + speeds / 1e-5)
+    pulled = 3.0 * np.pi * work * radius
+    cube = loads + pulled + np.sqrt(2.0 * pulled * loads + pulled**2)
+    area = np.pi * (0.75 * radius / modulus * cube) ** (2.0 / 3.0)
+    assert_allclose(dataset["phase_start"], [0.0, *times], rtol=1e-12)
+    assert_allclose(dataset["phase_peak_stress"], stress, rtol=1e-12)
+    assert_allclose(dataset["phase_peak_friction"], stress * area, rtol=1e-9)
+    assert_allclose(dataset["phase_peak_friction_area"], area, rtol=1e-9)
+    for name in ("phase_peak_time", "phase_peak_friction_time"):
+        assert (dataset[name] >= dataset["phase_start"] - 1e-9).all()
+        assert (dataset[name] < dataset["phase_end"]).all()
+
+
+@pytest.mark.parametrize("late", [0.0, 0.006, 0.014])
+@pytest.mark.parametrize("model", ["spring", "force"])
+def test_the_friction_of_a_driven_slider_in_a_phase_is_that_under_its_load_and_force(
+    model, late
+):
+    """Behind a spring it is the largest of the records between the jumps, under a force it is this force."""
+    times, loads = [1.0 + late, 2.0 + late], np.array([2e-6, 1e-6, 3e-6])
+    time, forces = [0.0, *np.repeat(times, 2), 3.0], np.array([1.2e-7, 6e-8, 9e-8])
+    drive = {"model": "spring", "stage": 1e-6, "stiffness": 10.0, "start": "steady"}
+    if model == "force":
+        force = {"time": time, "value": list(np.repeat(forces, 2))}
+        drive = {"model": "force", "force": force}
+    dataset = sim.run(
+        {
+            "clock": {"duration": 3.0, "step": 0.02},
+            "solid": {"shear_modulus": 0.75e6},
+            "sphere": {"radius": 10e-6},
+            "adhesion": {"work": 0.05},
+            "contact": {"load": {"time": time, "value": list(np.repeat(loads, 2))}},
+            "drive": drive | {"contact_stiffness": "rigid"},
+            "bonds": {
+                "model": "rate",
+                "rupture": {
+                    "model": "bell",
+                    "zero_force_rate": 1e3,
+                    "bell_force": 4e-12,
+                },
+                "bond_stiffness": 1e-3,
+                "rebinding_rate": 1e4,
+                "site_density": 1e16,
+            },
+        }
+    )
+    peaks, starts = dataset["phase_peak_friction"], dataset["phase_start"]
+    assert_allclose(starts, [0.0, *times], rtol=1e-12)
+    expected, records = forces, dataset["friction_force"].squeeze()
+    if model == "spring":
+        ends = zip([-1.0, *times], [*times, 4.0], strict=True)
+        expected = [
+            records.where((records.t > low + 1e-9) & (records.t < high - 1e-9)).max()
+            for low, high in ends
+        ]
+    assert_allclose(peaks, expected, rtol=1e-3)
+    assert (dataset["phase_peak_friction_time"] >= starts - 0.02).all()

@@ -97,6 +97,8 @@ class _BondModel(Part):
     feeds_back: ClassVar[bool] = False
     #: True if bonds break by chance, one by one.
     is_random: ClassVar[bool] = False
+    #: Courses with which the stress jumps, as ``Phases`` names them.
+    jumps_with: ClassVar[frozenset[str]] = frozenset()
     #: True if the population is solved through blocks of clock steps.
     in_blocks: ClassVar[bool] = True
     #: Rough time of a single step of a batch, for estimates [s].
@@ -323,6 +325,8 @@ def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound)
 
 class _AtOnce(_WithoutStretch):
     """Attributes of models whose bonds are steady at every speed."""
+
+    jumps_with: ClassVar[frozenset[str]] = frozenset({"drive"})
 
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))
