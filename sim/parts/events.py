@@ -418,15 +418,22 @@ class Jumps(NamedTuple):
 NO_JUMPS = Jumps(False, False)
 
 
+class PhaseEnd(NamedTuple):
+    """Share of the last step of a block before the end of the phase, and True if area and pull jump there."""
+
+    share: float = 1.0
+    jumps: bool = False
+
+
 class Followed(NamedTuple):
-    """What is followed in a block of steps: the path, the area at the largest stress, and jumps in the last step.
+    """What is followed in a block of steps: the path, the area at the largest stress, and the last step to its ``end``.
 
     Members that share a stress may differ in the area at its largest.
     """
 
     path: bool = False
     area: bool = True
-    jumps: Jumps = NO_JUMPS
+    end: PhaseEnd = PhaseEnd()
 
 
 class Events(NamedTuple):
@@ -563,8 +570,8 @@ def after(
 ) -> Events:
     """Return the events after a block of steps in one phase, from bonds, contact and pull [N] at the end of each.
 
-    ``before`` are bonds and contact radius at its start. What jumps in the last step keeps its value before the step in
-    the maxima of the phase, because the phase ends there.
+    ``before`` are bonds and contact radius at its start. If the phase ends within the last step, the stress there is
+    the smaller one by the tangents at both ends of the step, and what jumps there keeps its value before the step.
 
     Notes
     -----
@@ -613,7 +620,7 @@ def after(
         (stress, stiffness, relaxation),
         (radii, pull, contact.work, contact.detached, contact.turn),
         ends,
-        (1.0 * followed.area, 1.0 * bent, *np.multiply(1.0, followed.jumps)),
+        (1.0 * followed.area, 1.0 * bent, *np.multiply(1.0, followed.end)),
         tuple(values[:, -1] for values in now),
     )
     path = (
@@ -658,25 +665,29 @@ def _follow(bonds, contacts, motion, traits, events):
 
     ``bonds``: stress, its stiffness and its relaxation; with the radii and ``motion`` as ``after`` has them.
     ``contacts``: radii, pulls, works of adhesion, times of detachment, turns. ``traits``: 1 if the area at the largest
-    stress is followed, 1 if bonds have no stretch, and 1 if the stress, or the area, jumps in the last step.
-    ``events``: the present rows of the first five of ``Events``.
+    stress is followed, 1 if bonds have no stretch, and the ``PhaseEnd``. ``events``: the present rows of the first five
+    of ``Events``.
     """
     radii, pulls, works, detached, turns = contacts
     first, speed, strengths, since, times, steps = motion
     stress, friction, pull, contact, rises = events
-    (share, bent, stress_jumps, area_jumps), none = traits, (0.0, math.nan, 0.0)
+    (share, bent, part, jumps), none = traits, (0.0, math.nan, 0.0)
     for k in range(len(times)):
         time, step, is_last = times[k], steps[k], k == len(times) - 1
+        left = (1.0 - part) * step if is_last else 0.0
+        has_jump = is_last and jumps > 0.0
         for i in range(len(friction)):
             strength, place = _of(strengths, k, i), _of(since, k, i) / step
             speeds = _of(first, k, i), _of(speed, k, i)
             value0, slope0, area0 = _load(k, i, *bonds, speeds[0], radii)
             value1, slope1, area1 = _load(k + 1, i, *bonds, speeds[1], radii)
-            ends = value1, value1 * area1
-            if is_last and stress_jumps > 0.0:
-                value1, slope1 = value0, slope0
-            area1 = area0 if is_last and area_jumps > 0.0 else area1
-            around = time, step, speeds[0], speeds[1], area0, area1
+            last, area1 = (value1, value1 * area1), area0 if has_jump else area1
+            if left > 0.0:
+                value1 = _at_end(value0, slope0, value1, slope1, left, step)
+                slope1, area1 = slope0, area1 - (area1 - area0) * left / step
+                place = max(place - left / step, 0.0) * step / (step - left)
+                speeds = speeds[0], speeds[0]
+            around = time - left, step - left, speeds[0], speeds[1], area0, area1
             if i < len(stress):
                 # an open contact has none to leave out
                 areas = (area0, area1) if share > 0.0 else (0.0, 0.0)
@@ -689,7 +700,7 @@ def _follow(bonds, contacts, motion, traits, events):
                     stress,
                     i,
                 )
-            growth = (area1 - area0) / step
+            growth = (area1 - area0) / (step - left)
             rise, slope = (
                 area0 * slope0 + growth * value0,
                 area1 * slope1 + growth * value1,
@@ -704,10 +715,10 @@ def _follow(bonds, contacts, motion, traits, events):
             _keep(value1 * area1, rise, slope, around, kink, friction, i)
             if rises[i, 1] == 0.0:
                 _rise(friction, rises, i)
-            if is_last and stress_jumps + area_jumps > 0.0 and ends[1] >= 0.0:
+            if (left > 0.0 or has_jump) and last[1] >= 0.0:
                 # with which the next phase starts
-                friction[i, 1] = ends[1]
-                stress[i if i < len(stress) else 0, 1] = ends[0]
+                friction[i, 1] = last[1]
+                stress[i if i < len(stress) else 0, 1] = last[0]
         for i in range(len(pull)):
             if math.isnan(_of(first, k, i)):  # the motion had ended before
                 continue
@@ -716,8 +727,8 @@ def _follow(bonds, contacts, motion, traits, events):
                 math.pi * _of(radii, k + 1, i) ** 2,
             )
             around = time, step, _of(first, k, i), _of(speed, k, i), area0, area1
-            now, before = _of(pulls, k, i), pull[i, 1]
-            held = before if is_last and area_jumps > 0.0 else now
+            now = _of(pulls, k, i)
+            held = pull[i, 1] if has_jump else now
             _keep(held, math.nan, math.nan, around, none, pull, i)
             pull[i, 1] = 0.0 if math.isnan(now) else now
         for i in range(len(contact)):
@@ -739,6 +750,13 @@ def _follow(bonds, contacts, motion, traits, events):
             ):
                 turn = turns[k, i if turns.shape[1] > 1 else 0]
                 _turn(time, step, radius, work, opening, turn, contact[i])
+
+
+@device
+def _at_end(first, rise, last, slope, left, step):
+    """Return a stress at a kink or a jump within a step, a time ``left`` before its end; slopes are at its ends."""
+    ahead, back = first + rise * (step - left), last - slope * left
+    return max(min(ahead, back), 0.0) if ahead + back < math.inf else first
 
 
 @device

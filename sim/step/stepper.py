@@ -190,11 +190,10 @@ class Stepper:
         scene, history, phases = self.scene, state.events, self.scene.phases
         if steps.start in phases.steps[1:]:
             phase = phases.steps.index(steps.start)
-            since, jumps = self._first_turn(phase), self._jumps(steps.start)[1]
+            since, jumps = self._first_turn(phase), self._phase_end(steps.start)[1]
             history = history.next_phase(since, phases.rests[phase - 1], jumps)
-        followed = events.Followed(
-            scene.follows_path, scene.shares_area, self._jumps(steps.stop)[0]
-        )
+        end, _ = self._phase_end(steps.stop)
+        followed = events.Followed(scene.follows_path, scene.shares_area, end)
         return events.after(
             history,
             (state.bonding, state.contact.radius),
@@ -215,20 +214,20 @@ class Stepper:
         is_jump = "mount" in phases.jumps[phase]
         return start - near if is_jump else math.nextafter(start, math.inf)
 
-    def _jumps(self, first: int) -> tuple[events.Jumps, events.Jumps]:
-        """Return what jumps where a phase with a first clock step starts: in the step before, and from its end on.
+    def _phase_end(self, first: int) -> tuple[events.PhaseEnd, events.Jumps]:
+        """Return how a phase ends in the step before the first of another, and what jumps from the end of this on.
 
         A mount that jumps at the end of a step has jumped there, and a drive has not.
         """
         scene, phases = self.scene, self.scene.phases
         if first not in phases.steps[1:]:
-            return events.NO_JUMPS, events.NO_JUMPS
+            return events.PhaseEnd(), events.NO_JUMPS
         phase, near = phases.steps.index(first), _SAME * scene.times.duration
         late = phases.starts[phase] - scene.times.at(first - 1)
-        names = phases.jumps[phase]
+        names, share = phases.jumps[phase], min(1.0 + late / scene.times.step, 1.0)
         stress, area = bool(names & self._moves_stress), "mount" in names
-        early = events.Jumps(stress and late < -near, area and late <= near)
-        return early, events.Jumps(stress and not early.stress, area and not early.area)
+        end = events.PhaseEnd(1.0 if late > -near else share, area and late <= near)
+        return end, events.Jumps(stress and late > -near, area and late > near)
 
     def _pull(self, time: float | Array, touch: ContactState) -> Array:
         """Return the tensile load of the contact [N] if the control makes it, else nothing."""

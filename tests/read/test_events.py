@@ -1069,3 +1069,24 @@ def test_the_friction_of_a_driven_slider_in_a_phase_is_that_under_its_load_and_f
         ]
     assert_allclose(peaks, expected, rtol=1e-3)
     assert (dataset["phase_peak_friction_time"] >= starts - 0.02).all()
+
+
+@pytest.mark.parametrize("late", [0.0, 0.006, 0.014])
+def test_a_slider_at_rest_has_no_friction_up_to_the_moment_at_which_it_starts(late):
+    """Bonds that live for a twentieth of a clock step bear their steady stress at the end of the step of the start."""
+    rupture = {"model": "bell", "zero_force_rate": 1e3, "bell_force": 4e-12}
+    sites = {"rebinding_rate": 1e4, "site_density": 1e16, "bond_stiffness": 1e-3}
+    dataset = sim.run(
+        {
+            "clock": {"duration": 2.0, "step": 0.02},
+            "solid": {"shear_modulus": 0.75e6},
+            "sphere": {"radius": 10e-6},
+            "adhesion": {"work": 0.05},
+            "contact": {"load": 2e-6},
+            "drive": {"model": "start", "speed": 1e-6, "rest": 1.0 + late},
+            "bonds": {"model": "rate", "rupture": rupture, **sites},
+        }
+    )
+    resting, sliding = dataset["phase_peak_friction"].values.ravel()
+    assert resting == 0.0
+    assert_allclose(sliding, dataset["friction_force"].max(), rtol=0.01)
