@@ -715,10 +715,12 @@ def _follow(bonds, contacts, motion, traits, events):
             _keep(value1 * area1, rise, slope, around, kink, friction, i)
             if rises[i, 1] == 0.0:
                 _rise(friction, rises, i)
-            if (left > 0.0 or has_jump) and last[1] >= 0.0:
-                # with which the next phase starts
-                friction[i, 1] = last[1]
-                stress[i if i < len(stress) else 0, 1] = last[0]
+            if left > 0.0 or has_jump:
+                # with which the next phase starts; an open contact has no area
+                friction[i, 1] = last[1] if last[1] >= 0.0 else 0.0
+                stress[i if i < len(stress) else 0, 1] = (
+                    last[0] if last[0] >= 0.0 else 0.0
+                )
         for i in range(len(pull)):
             if math.isnan(_of(first, k, i)):  # the motion had ended before
                 continue
@@ -846,6 +848,8 @@ def _keep(now, rise, slope, around, kink, maxima, i):
             speed1 - place * (speed1 - speed0),
             area1 - place * (area1 - area0),
         )
+    if place == 1.0:  # the contact may open, or the motion end, in the step
+        maxima[i, 5], maxima[i, 6] = speed0, area0
 
 
 @device

@@ -9,6 +9,7 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
+from helpers.corner_scenes import corner_scene
 from helpers.statements import statistics
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
@@ -662,3 +663,14 @@ def test_a_pull_off_that_the_jump_of_a_load_makes_is_in_the_phase_that_it_begins
     assert_allclose(dataset["phase_pull_off_time"], [np.nan, down, np.nan], rtol=1e-8)
     assert_allclose(dataset["pull_off_time"], down, rtol=1e-8)
     assert_allclose(dataset["jump_in_time"], up, atol=0.02)
+    assert dataset["phase_peak_friction"].values.ravel()[1] == 0.0  # it is open
+
+
+def test_the_lowest_load_has_its_displacement_if_the_contact_opens_in_the_next_step():
+    """The load of a lagging edge jumps at the end of a clock step, to where the edge runs in within the next step."""
+    scene = corner_scene(122)
+    lowest = min(scene["contact"]["load"]["value"])
+    dataset = sim.run(scene | {"ensemble": {"members": 1}})
+    assert_allclose(dataset["lowest_load"], lowest, rtol=1e-12)
+    assert_allclose(dataset["lowest_load_time"], dataset["phase_start"][1], rtol=1e-8)
+    assert np.isfinite(dataset["lowest_load_displacement"]).all()
