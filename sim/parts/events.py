@@ -426,7 +426,7 @@ class PhaseEnd(NamedTuple):
 
 
 class Followed(NamedTuple):
-    """What is followed in a block of steps: the path, the area at the largest stress, and the last step to its ``end``.
+    """Path and area at the largest stress, if they are followed in a block of steps, and the ``end`` of its last step.
 
     Members that share a stress may differ in the area at its largest.
     """

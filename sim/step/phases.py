@@ -79,7 +79,7 @@ def phases(drive: Drive, contact: Contact, times: Times) -> Phases:
 
 
 class _Turn(NamedTuple):
-    """What a course does from a time on: its sense and its trend, and its change at that time, if it ``jumps``.
+    """Sense and trend of a course from a time on, and its change at that time, if it ``jumps``.
 
     The sense of a course that is not signed is 1; the trend of one that is that of its magnitude. The ``gain`` is how
     much the value at the start exceeds the one before, in the sense of the latter.
