@@ -263,7 +263,11 @@ def _event(
         )
 
     def in_phases(scene: Scenario, state: State) -> Any:
-        return read(scene, state.events.by_phase("contact" if turns else of))
+        values = read(scene, state.events.by_phase("contact" if turns else of))
+        if QUANTITIES[name].unit != "s":
+            return values
+        # what a phase takes over from the clock step before is its value at the start
+        return np.maximum(values, scene.phases.starts[: values.shape[-1]])
 
     of_phase = in_a_phase(QUANTITIES[name]).name
     return Variable(name, part, whole), Variable(of_phase, part, in_phases, "phase")

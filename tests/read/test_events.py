@@ -1068,7 +1068,7 @@ def test_the_friction_of_a_driven_slider_in_a_phase_is_that_under_its_load_and_f
             for low, high in ends
         ]
     assert_allclose(peaks, expected, rtol=1e-3)
-    assert (dataset["phase_peak_friction_time"] >= starts - 0.02).all()
+    assert (dataset["phase_peak_friction_time"] >= starts).all()
 
 
 @pytest.mark.parametrize("late", [0.0, 0.006, 0.014])
