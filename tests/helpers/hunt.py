@@ -2,8 +2,8 @@
 
 ``PYTHONPATH=tests:. python -m helpers.hunt corner 0 500`` goes through 500 scenes at corners. With ``random`` it goes
 through those of ``random_scenes``, and with ``finer`` it compares their runs at several clock steps, too, which takes
-ten times as long. A last number sets the processes. A scene that takes longer than ``PATIENCE`` is stopped, which
-counts as a fault. Times are those of the processor.
+ten times as long. A last number sets the processes. A scene whose run is foretold to take longer than ``PATIENCE`` is
+counted and left out. One that takes longer is stopped, which counts as a fault. Times are those of the processor.
 """
 
 import multiprocessing
@@ -15,6 +15,10 @@ from multiprocessing.connection import wait
 
 import psutil
 
+from sim.ensemble.pace import pace
+from sim.ensemble.plan import Plan
+from sim.ensemble.preview import forecast
+
 #: Time of one scene with all its checks [s].
 PATIENCE = 120.0
 
@@ -24,11 +28,20 @@ def faults_of(kind, seed):
     import test_total
 
     draw = test_total.corner_scene if kind == "corner" else test_total.random_scene
+    scenario = test_total.admitted(draw(seed))
+    if scenario is not None and foretold(scenario) > PATIENCE:
+        return [], Counter({"foretold to take long": 1})
     try:
         faults, corners = test_total.faults_in(seed, kind == "finer", draw)
     except Exception as fault:
         return [short(fault)], Counter()
     return [short(fault) for fault in faults], corners
+
+
+def foretold(scenario):
+    """Return the time that ``sim check`` says that a run takes [s]."""
+    plan = Plan.of(scenario)
+    return forecast(plan, 1, pace(plan)).cpu
 
 
 def short(fault):
