@@ -873,12 +873,13 @@ def answer(row, piece, slider, contact, energy):
 
     At the start of a clock step ΔΓ has been drawn: the answer to the difference from its mean is no sliding path.
     """
-    going, contact = _held_up(row, slider, contact, energy)
+    going, held = _held_up(row, slider, contact, energy)
     if piece == 0 and row.felt != row.drawn:
-        path, row.felt, contact = row.path, row.drawn, drawn(contact, row, piece)
-        going, contact = _held_up(row, slider, contact, energy)
+        path, row.felt = row.path, row.drawn
+        # what the mean of the draws does not hold, the draw may
+        going, held = _held_up(row, slider, drawn(contact, row, piece), energy)
         row.path = path
-    return going, contact
+    return going, held
 
 
 @device
