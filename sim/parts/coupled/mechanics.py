@@ -857,8 +857,8 @@ def elastic(row, time, slider, contact, energy):
 def _held_up(row, slider, contact, energy):
     """Return ``elastic`` at the start of a piece, and the contact; one that is lost by that keeps its radius.
 
-    Bonds that an area dilutes, a force that jumps, or a draw of ΔΓ may leave no equilibrium. As within a piece, the
-    interface goes on to the end of the clock step, where the contact opens.
+    Bonds that an area dilutes, or a draw of ΔΓ, may leave no equilibrium. As within a piece, the interface goes on to
+    the end of the clock step, where the contact opens.
     """
     going = elastic(row, 0.0, slider, contact, energy)
     if not going and contact.stays == 0.0:
