@@ -23,8 +23,6 @@ from sim.units.terminal import duration
 
 #: Most points of a band that are drawn.
 _DRAWN = 1000
-#: Simulated data sets of a plan, fewer than those of the command.
-_SIMS = 100
 #: Quantities that are drawn.
 _NAMES = ("contact_area", "friction_force")
 #: Forces of a motion in words.
@@ -80,14 +78,17 @@ def _clock(say: Say) -> Callable[[int, int], None]:
 
 
 def planned(
-    scenario: Scenario, table: Any, free: list[str], say: Say
+    scenario: Scenario, table: Any, free: list[str], say: Say, sims: int = 100
 ) -> dict[str, Any]:
-    """Plan a measurement at the points of a table: return what it can tell in words, and where to measure next."""
+    """Plan a measurement at the points of a table: return what it can tell in words, and where to measure next.
+
+    The ``sims`` simulated data sets are fewer than those of the command, for the sake of who waits at the page.
+    """
     from sim.explorer.figures import rings
     from sim.study.likelihood import problem_of
     from sim.study.plan import plan
 
-    result = plan(scenario, table, free, sims=_SIMS, progress=_clock(say))
+    result = plan(scenario, table, free, sims=sims, progress=_clock(say))
     further = [point.conditions for point in result.best]
     is_measured = all(np.isfinite(curve.values).all() for curve in table.curves)
     problem = problem_of(scenario, [table], [], {})

@@ -26,6 +26,7 @@ from sim.explorer.page import Page, Refused, previews
 from sim.explorer.server import Server, state_of
 from sim.laws import jkr
 from sim.parts.shear import models
+from sim.study import mechanisms, plan
 from sim.study.curves import curves, speeds_of_loss
 from sim.study.likelihood import problem_of
 from sim.units.notation import engineering
@@ -683,7 +684,10 @@ def test_a_plan_takes_relative_errors_of_what_it_predicts_as_the_command_does(tm
         assert f"{heading}: {words}" in said["text"]
 
 
-def test_a_table_of_errors_alone_serves_a_plan():
+def test_a_table_of_errors_alone_serves_a_plan(monkeypatch):
+    # fewer starts of each search, and no further speeds
+    monkeypatch.setattr(mechanisms, "_STARTS", 2)
+    monkeypatch.setattr(plan, "_SPEEDS", 2)
     page = Page(sim.load("scenarios/pdms_lens.toml"))
     text = "speed [mm/s],contact_area_error [%]\n0.01,0.7\n0.9,0.7\n"
     key = page.add(text, "points.csv")
@@ -691,7 +695,7 @@ def test_a_table_of_errors_alone_serves_a_plan():
     assert "plan" in page.answer({}, 0.1, table=key)["data"]["words"]
     assert page.figure({}, "data", key)["panels"] == []
     table = page.planned(key)
-    found = planned(page.read({}), table, ["bonds.critical_speed"], print)
+    found = planned(page.read({}), table, ["bonds.critical_speed"], print, sims=50)
     assert "P(told apart)" in found["text"] and found["marks"] == []
     # a table without errors is refused by the words of a fit
     with pytest.raises(sim.BadInput, match="measured"):
