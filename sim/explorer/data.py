@@ -10,7 +10,9 @@ import numpy as np
 from sim.explorer.drawing import listed
 from sim.explorer.figures import fitness
 from sim.scenario.scenario import Scenario
-from sim.study.likelihood import Measured, by_steady_sliding, problem_of, read
+from sim.study.likelihood import problem_of
+from sim.study.measurement import Measured, read
+from sim.study.prediction import by_steady_sliding
 from sim.units.errors import BadInput
 
 #: Bytes and rows that a table may have.

@@ -13,7 +13,8 @@ from sim.scenario.scenario import Scenario
 from sim.units.notation import engineering, scaled
 
 if TYPE_CHECKING:
-    from sim.study.likelihood import Measured, Problem
+    from sim.study.likelihood import Problem
+    from sim.study.measurement import Measured
 
 #: Colours of curves that differ in their conditions, by the names that the page has for them.
 _COLOURS = ("bonds", "fluctuations", "own", "stress", "rest")
@@ -199,7 +200,8 @@ def band(
 def rings(problem: "Problem", points: Sequence[dict[str, float]]) -> list[Any]:
     """Return further points of a plan, by their conditions [SI], as rings on the curve ``of`` each variable."""
     from sim.study.fit import courses
-    from sim.study.likelihood import Curve, problem_of
+    from sim.study.likelihood import problem_of
+    from sim.study.measurement import Curve
 
     (table,) = problem.tables
     curves = [Curve(name, np.zeros(1), np.ones(1)) for name in table.names]

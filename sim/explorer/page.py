@@ -29,7 +29,7 @@ from sim.units.notation import engineering, scaled
 from sim.units.quantity import Quantity
 
 if TYPE_CHECKING:
-    from sim.study.likelihood import Measured
+    from sim.study.measurement import Measured
 
 #: Points of a curve, and speeds at which a key is tried; change of a curve that counts.
 _POINTS, _TRIED, _CHANGE = 121, 9, 1e-9

@@ -1,6 +1,6 @@
 """Numbers of a scenario calibrated to measured curves: ``sim fit``.
 
-The curves are fitted by steady sliding, which is quick (``sim.study.likelihood``). Then the models of the scenario run
+The curves are fitted by steady sliding, which is quick (``sim.study.prediction``). Then the models of the scenario run
 once with the fitted values. Their difference from steady sliding is added as a correction, with the error of their
 members. The fit is repeated until it no longer changes. The same noise is drawn each time. Every prediction is a run in
 two cases. Steady sliding may not depend on a free key, such as the speed of an edge that lags. Or the drive may solve
@@ -34,20 +34,19 @@ from sim.scenario.files import parse, written
 from sim.scenario.reader import override
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, quantities
-from sim.study import likelihood
+from sim.study import likelihood, measurement
 from sim.study.converge import Printed
 from sim.study.likelihood import (
     LEVEL,
-    MOUNT,
     Free,
     Interval,
-    Measured,
     Minimum,
     Problem,
     ZeroProfile,
     idle,
     with_errors,
 )
+from sim.study.measurement import MOUNT, Measured
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
 from sim.units.notation import chance, concise, engineering, in_units, scaled
@@ -262,7 +261,7 @@ class Fit(NamedTuple):
 
 def fit(
     scenario: Scenario,
-    data: Sequence[Path | likelihood.Measured],
+    data: Sequence[Path | measurement.Measured],
     free: Iterable[str],
     common: dict[str, float] | None = None,
     steady: bool = False,
@@ -276,7 +275,7 @@ def fit(
     scenario : Scenario
         The search starts at its values; its sweep is left out.
     data : sequence of Path
-        CSV tables (``sim.study.likelihood.read``), or what was read of them, all fitted together.
+        CSV tables (``sim.study.measurement.read``), or what was read of them, all fitted together.
     free : iterable of str
         Keys, each ``"KEY"`` or ``"KEY=LOW:HIGH"`` with bounds such as ``"1 mm/s:100 mm/s"``.
     common : dict, optional
@@ -301,7 +300,7 @@ def fit(
     shared = [free_number(base, text) for text in free]
     split = [free_number(base, text, "--per-table") for text in per_table]
     tables = [
-        likelihood.read(path, base, place=(k, len(data)))
+        measurement.read(path, base, place=(k, len(data)))
         if isinstance(path, Path)
         else path
         for k, path in enumerate(data)
@@ -309,7 +308,7 @@ def fit(
     if not any(item.key.startswith("zero.load") for item in (*shared, *split)):
         # a baseline tells the zero of the load alone
         tables = [table.in_contact if table.baseline else table for table in tables]
-    tables = likelihood.with_stated_errors(tables, errors)
+    tables = measurement.with_stated_errors(tables, errors)
     if faults := [*conflicts(base, shared, split, tables)]:
         raise BadInput(faults)
     places = itertools.product(split, enumerate(tables))
@@ -760,7 +759,7 @@ def courses(problem: Problem, x: Array) -> tuple[list[Course], list[str]]:
     result = []
     for number, (table, name) in enumerate(problem.curves):
         along = _along(problem.tables[table])
-        is_joined = problem.is_rough or along.key not in likelihood.COURSES
+        is_joined = problem.is_rough or along.key not in measurement.COURSES
         first = np.argmax(problem.curve == number)
         order = np.argsort(along.values, kind="stable")
         for condition in np.unique(conditions[table]):
@@ -814,7 +813,7 @@ def _alike(problem: Problem) -> tuple[list[NDArray[np.int64]], list[str]]:
     )
     split = any(item.table >= 0 for item in problem.free)
     columns: dict[str, Any] = {"": places if split else 0.0 * places}
-    declared = dict(likelihood.conditions_of(problem.groups[0][0].scenario).values())
+    declared = dict(measurement.conditions_of(problem.groups[0][0].scenario).values())
     others = {key for table in problem.tables for key in table.conditions} - {"t"}
     for key in sorted(others):
         values = [
@@ -888,7 +887,7 @@ def carried_out(
         if not is_scenario or path.resolve() in [other.resolve() for other in inputs]:
             files.claim(path, replace, inputs)
     tables = [
-        likelihood.read(path, scenario, place=(k, len(data)))
+        measurement.read(path, scenario, place=(k, len(data)))
         for k, path in enumerate(data)
     ]
     if judged and any(table.has_history for table in tables):

@@ -15,7 +15,8 @@ import numpy as np
 
 from sim.parts.exchange import Array
 from sim.scenario.schema import quantities
-from sim.study.likelihood import AT_FORCE, Free, Minimum, Problem, idle, minimum, spread
+from sim.study.likelihood import Free, Minimum, Problem, idle, minimum, spread
+from sim.study.prediction import AT_FORCE
 from sim.units.errors import BadInput
 from sim.units.notation import chance
 from sim.units.quantity import Quantity

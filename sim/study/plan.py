@@ -28,9 +28,10 @@ from sim.parts.exchange import Array
 from sim.plots import style
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
-from sim.study import fit as fits, likelihood
+from sim.study import fit as fits, likelihood, measurement
 from sim.study.converge import Printed
-from sim.study.likelihood import LEVEL, Free, Interval, Measured, Minimum, Problem
+from sim.study.likelihood import LEVEL, Free, Interval, Minimum, Problem
+from sim.study.measurement import Measured
 from sim.study.mechanisms import PARTS, RARE, WHOLE, WORSE, Search, draws_of, others
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, in_units, scaled
@@ -421,7 +422,7 @@ def _read(
     if isinstance(path, Measured):
         table = path
     else:
-        table = likelihood.read(path, scenario, template or ["contact_area"])
+        table = measurement.read(path, scenario, template or ["contact_area"])
     for name, values, errors in table.curves:
         if errors is None and not (template and np.isnan(values).all()):
             cure = f'a plan needs them; add a column "{name}{ERROR} [%]" of numbers above 0'
@@ -496,7 +497,7 @@ def _with_errors(row: Measured, problem: Problem) -> Measured:
 
 def _words(scenario: Scenario, table: Measured, row: Measured) -> str:
     """Return conditions and variables of a further point that are not the same in the whole table, for people."""
-    declared = dict(likelihood.conditions_of(scenario).values())
+    declared = dict(measurement.conditions_of(scenario).values())
     texts = list[str]()
     for key in sorted(row.conditions, key=lambda key: key != "speed"):
         values = table.conditions.get(key, np.array([0.0, 1.0]))

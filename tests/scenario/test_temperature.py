@@ -14,9 +14,10 @@ from sim.ensemble.steady import steady_course
 from sim.ensemble.variables import READ
 from sim.parts.temperature import Arrhenius, Wlf
 from sim.scenario.reader import load
-from sim.study import likelihood
+from sim.study import likelihood, measurement
 from sim.study.fit import free_number
-from sim.study.likelihood import Curve, Measured, minimum, problem_of
+from sim.study.likelihood import minimum, problem_of
+from sim.study.measurement import Curve, Measured
 from sim.units.errors import BadInput
 
 #: Temperatures [K] of the scenes and of their numbers.
@@ -497,7 +498,7 @@ def test_a_fit_finds_both_energies_from_a_table_with_temperatures(tmp_path, curv
     path.write_text("\n".join([header, *lines]), encoding="utf-8")
     guess = at(rupture=arrhenius(60e3), rebinding=arrhenius(60e3))
     scene = load(LENS | {"bonds": COHORT, "temperature": guess})
-    table = likelihood.read(path, scene)
+    table = measurement.read(path, scene)
     free = [free_number(scene, key) for key in ENERGIES]
     problem = problem_of(scene, [table], free, {})
     best = minimum(problem, problem.start, precision=1e-14)

@@ -23,10 +23,18 @@ from sim.cli import cli
 from sim.laws import halfspace, jkr, schallamach
 from sim.scenario.files import written
 from sim.scenario.reader import load
-from sim.scenario.schema import quantities
-from sim.study import fit as calibration, likelihood, mechanisms, paper
+from sim.scenario.schema import changed, quantities
+from sim.study import (
+    fit as calibration,
+    likelihood,
+    measurement,
+    mechanisms,
+    paper,
+    prediction,
+)
 from sim.study.fit import figure, fit
-from sim.study.likelihood import Curve, Measured, minimum, problem_of
+from sim.study.likelihood import minimum, problem_of
+from sim.study.measurement import Curve, Measured
 from sim.study.paper import Check, checks
 from sim.units.errors import BadInput
 from sim.units.notation import in_units
@@ -185,10 +193,10 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
     for label, changes in scenes.items():
         scene = load(LENS).with_values(changes)
         made, names = rows_of(scene, speed=SPEEDS[::3])
-        (group,) = likelihood.groups(scene, made)
-        alone = likelihood.by_steady_sliding(group, {}, names)
+        (group,) = prediction.groups_of(scene, made)
+        alone = prediction.by_steady_sliding(group, {}, names)
         for name, mean, error in zip(
-            names, *likelihood.by_runs([group], {}, names, False), strict=True
+            names, *prediction.by_runs([group], {}, names, False), strict=True
         ):
             assert_allclose(
                 alone[name], mean, rtol=1e-12, atol=0, equal_nan=False, err_msg=label
@@ -203,17 +211,17 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
     ):
         scene = load(LENS).with_values(changes)
         made, names = rows_of(scene, **conditions)
-        (group,) = likelihood.groups(scene, made)
-        means, _ = likelihood.by_runs([group], {}, names, "t" in conditions)
-        alone = likelihood.by_steady_sliding(group, {}, names)
+        (group,) = prediction.groups_of(scene, made)
+        means, _ = prediction.by_runs([group], {}, names, "t" in conditions)
+        alone = prediction.by_steady_sliding(group, {}, names)
         assert_allclose(means, [alone[name] for name in names], rtol=1e-12, atol=0)
     scene = load(LENS)
     loads, moduli = np.array([-1e-4, 0.0, 4e-3, 4e-3]), np.array([1e6, 1e6, 1e6, 2e6])
     made, names = rows_of(scene, mount=loads, **{"solid.shear_modulus": moduli})
-    groups = likelihood.groups(scene, made)
+    groups = prediction.groups_of(scene, made)
     assert [group.rows.tolist() for group in groups] == [[0, 1, 2], [3]]
     for group in groups:
-        found = likelihood.by_steady_sliding(group, {"adhesion.work": 0.05}, names)
+        found = prediction.by_steady_sliding(group, {"adhesion.work": 0.05}, names)
         for k, row in enumerate(group.rows):
             one = {
                 "contact.load": loads[row],
@@ -229,7 +237,7 @@ def test_steady_sliding_is_what_a_run_ends_in_also_for_rows_of_loads_and_solids_
         "contact.load": 1e-3,
         "solid.shear_modulus": 1e6,
     }
-    found = likelihood.changed(scene, values)
+    found = changed(scene, values)
     assert quantities(found) == quantities(scene.with_values(values))
     assert (
         found.rest_radius == scene.with_values(values).rest_radius != scene.rest_radius
@@ -250,7 +258,7 @@ def test_intervals_hold_the_truth_in_95_of_100_fits(
             for n, v in noisy(truth, 0.01, seed).items()
         )
         data = Measured(Path("made.csv"), "load", {"speed": SPEEDS}, curves)
-        monkeypatch.setattr(likelihood, "read", lambda path, base, place: data)
+        monkeypatch.setattr(measurement, "read", lambda path, base, place: data)
         result = fit(scene, [Path("made.csv")], KEYS, steady=True)
         assert result.converged
         rows.append(
@@ -287,7 +295,7 @@ def problem_with(scene, tables, truth, per_table=(), common=None):
     """Return the problem of free keys with the values that the truth predicts, and the place of the truth."""
     scene = load(scene).with_values({"record": {}})
     read = [
-        table if isinstance(table, Measured) else likelihood.read(table, scene)
+        table if isinstance(table, Measured) else measurement.read(table, scene)
         for table in tables
     ]
     free, place = [], []
@@ -934,7 +942,7 @@ def test_a_driven_slider_is_fitted_to_force_and_stage_and_members_shift_the_fit_
         and abs(rms.value - alone.values[rms.free.key]) > rms.error
         and np.all(noise[6:9] > 0.0)
     )
-    mean, error = likelihood.by_runs(
+    mean, error = prediction.by_runs(
         found.problem.groups[0], found.values, ["contact_area"], False
     )[:, 0]
     assert_allclose(found.problem.predicted(found.best.x)[:10], mean, rtol=2e-4)
@@ -962,8 +970,8 @@ def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_se
     for loads in tables:
         for each in loads:
             under = scene.with_values({"contact.load": each or 4e-3})
-            (group,) = likelihood.groups(under, rows_of(under, speed=SPEEDS)[0])
-            forces[each] = likelihood.by_steady_sliding(group, {}, ["friction_force"])[
+            (group,) = prediction.groups_of(under, rows_of(under, speed=SPEEDS)[0])
+            forces[each] = prediction.by_steady_sliding(group, {}, ["friction_force"])[
                 "friction_force"
             ]
         rows = [
@@ -983,7 +991,7 @@ def test_the_figure_has_one_curve_and_colour_for_each_load_in_one_table_or_in_se
                 0.05,
             )
         )
-    read = [likelihood.read(path, scene) for path in paths]
+    read = [measurement.read(path, scene) for path in paths]
     problem = problem_of(scene, read, [], {})
     with in_units(["mm/s", "mN"]):
         upper, lower = figure(
@@ -1032,7 +1040,7 @@ def test_a_fit_over_a_load_is_the_curve_of_the_model_and_over_other_keys_a_named
         ),
     }
     for column, path in paths.items():
-        problem = problem_of(scene, [likelihood.read(path, scene)], [], {})
+        problem = problem_of(scene, [measurement.read(path, scene)], [], {})
         upper, _ = figure(
             problem, likelihood.Minimum(problem.start, 0.0, None, True)
         ).axes
@@ -1149,8 +1157,8 @@ def drawn_of(
 ):
     """Curves of a scene at speeds, with errors."""
     made, _ = rows_of(scene, speed=speeds)
-    (group,) = likelihood.groups(scene, made)
-    exact = likelihood.by_steady_sliding(group, {}, list(names))
+    (group,) = prediction.groups_of(scene, made)
+    exact = prediction.by_steady_sliding(group, {}, list(names))
     curves = noisy(exact, error, seed)
     return made._replace(
         curves=tuple(Curve(n, v, error * np.abs(exact[n])) for n, v in curves.items())
@@ -1498,9 +1506,9 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
 def condition_tables(scene, changes, error, seed, noise=1.0, **chosen):
     """Tables named after conditions, each of the scene with its changes, with noise in units of the stated errors."""
     tables = []
-    for k, (name, changed) in enumerate(changes.items()):
+    for k, (name, differing) in enumerate(changes.items()):
         drawn, exact = (
-            drawn_of(scene.with_values(changed), e, 2 * seed + k, **chosen)
+            drawn_of(scene.with_values(differing), e, 2 * seed + k, **chosen)
             for e in (error, 1e-300)
         )
         pairs = zip(drawn.curves, exact.curves, strict=True)

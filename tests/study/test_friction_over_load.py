@@ -9,14 +9,8 @@ from numpy.testing import assert_allclose
 import sim
 from sim.laws import cohesive, jkr
 from sim.study.fit import fit
-from sim.study.likelihood import (
-    Curve,
-    Free,
-    Measured,
-    covariance_at,
-    minimum,
-    problem_of,
-)
+from sim.study.likelihood import Free, covariance_at, minimum, problem_of
+from sim.study.measurement import Curve, Measured
 from sim.study.mechanisms import draws_of
 from sim.units.quantity import Quantity
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 import sim
 from sim.laws import jkr, theories
 from sim.laws.incipient import Incipient
-from sim.study import likelihood
+from sim.study import measurement
 from sim.study.likelihood import interval, minimum
 from sim.study.mechanisms import others
 from sim.units.errors import BadInput
@@ -107,7 +107,7 @@ def test_the_numbers_of_the_law_have_no_default_and_a_scene_without_it_no_column
         with pytest.raises(BadInput, match=f"incipient.*{key}"):
             sim.load(SCENARIO, {"incipient": left})
     scenario = sim.load(SCENARIO.with_name("creep.toml"))
-    assert "tangential_force" not in likelihood.conditions_of(scenario)
+    assert "tangential_force" not in measurement.conditions_of(scenario)
 
 
 @pytest.mark.verify

@@ -16,7 +16,7 @@ from sim.cli import cli
 from sim.ensemble.steady import history_at_rest, jump_into_contact
 from sim.scenario.files import written as toml
 from sim.scenario.reader import load
-from sim.study import likelihood
+from sim.study import likelihood, measurement
 from sim.study.fit import fit, free_number, zero_figure
 from sim.study.likelihood import minimum, problem_of
 from sim.study.noise import Noise, noise_of
@@ -131,8 +131,8 @@ def test_a_history_at_rest_is_the_run_of_its_course():
 def posed(path, keys, errors=(), **changes):
     """Return the problem of a loop in a file for some free keys, with its baseline."""
     scene = load(SCENE).with_values(changes)
-    tables = [likelihood.read(path, scene)]
-    tables = likelihood.with_stated_errors(tables, errors)
+    tables = [measurement.read(path, scene)]
+    tables = measurement.with_stated_errors(tables, errors)
     return problem_of(scene, tables, [free_number(scene, key) for key in keys], {})
 
 
@@ -169,11 +169,11 @@ def test_loops_with_zeros_of_their_own_are_fitted_together_each_over_its_history
     tables, free = [], [free_number(scene, key) for key in TRUTH]
     for k, (name, zero) in enumerate(zeros.items()):
         path = written(tmp_path / f"{name}.txt", *loop(zero, depths[name]))
-        table = likelihood.read(path, scene, place=(k, 2)).in_contact
+        table = measurement.read(path, scene, place=(k, 2)).in_contact
         tables.append(table)
         item = free_number(scene, ZEROS[0])
         free.append(item._replace(key=f"{item.key} ({name})", table=k))
-    tables = likelihood.with_stated_errors(tables, ["1 nN"])
+    tables = measurement.with_stated_errors(tables, ["1 nN"])
     problem = problem_of(scene, tables, free, {})
     truth = [item.inner(TRUTH[key]) for key, item in zip(TRUTH, free, strict=False)]
     start = np.array([*truth, 2.48e-6, 2.67e-6])
@@ -325,7 +325,7 @@ def test_a_point_that_carries_chi_square_is_named_and_none_is_without_it(tmp_pat
 def test_what_a_loop_lacks_is_one_message_with_the_file(tmp_path, changes, words):
     path = written(tmp_path / "loop.txt", *loop())
     with pytest.raises(BadInput) as refusal:
-        likelihood.read(path, load(SCENE).with_values(changes))
+        measurement.read(path, load(SCENE).with_values(changes))
     (problem,) = refusal.value.problems
     assert "loop.txt: " in problem and words in problem, problem
 
@@ -333,7 +333,7 @@ def test_what_a_loop_lacks_is_one_message_with_the_file(tmp_path, changes, words
 def test_rows_are_thinned_but_the_turn_of_the_mount_stays(tmp_path):
     time, displacement, load_of = loop()
     path = written(tmp_path / "loop.txt", time, displacement, load_of)
-    table = likelihood.read(path, load(SCENE).with_values({"instrument.every": 7}))
+    table = measurement.read(path, load(SCENE).with_values({"instrument.every": 7}))
     rows = table.in_contact.conditions
     assert_allclose(rows["mount"].max(), displacement.max(), rtol=1e-11)
     assert rows["t"][[0, -1]].tolist() == [FIRST, LAST]
@@ -378,7 +378,7 @@ def test_a_jump_into_contact_adds_the_inverse_of_its_variance_to_that_of_the_zer
     path, error = written(tmp_path / "loop.txt", *loop(noise=NOISE, drift=0.0)), 2e-9
     reading = {"displacement": [ZERO], "displacement_error": error}
     scene = load(SCENE | {"jump_in": reading}).with_values({**TRUTH, **WHERE})
-    table = likelihood.read(path, scene)
+    table = measurement.read(path, scene)
     free = [free_number(scene, key) for key in [*TRUTH, *ZEROS]]
     problems = [
         problem_of(scene, [each], free, {})
@@ -420,11 +420,11 @@ def test_a_range_of_adhesion_moves_the_reading_of_the_jump_and_a_common_error_it
     rest = {k: v for k, v in SCENE.items() if k != "instrument"}
     scene = load(rest | {"contact": ranged, "jump_in": table})
     time = np.array([0.0, 1.0, 2.0])
-    points = likelihood.Measured(
+    points = measurement.Measured(
         path=Path("loop.csv"),
         mount="displacement",
         conditions={"t": time, "mount": np.array([2.4e-6, 2.5e-6, 2.4e-6])},
-        curves=(likelihood.Curve("normal_load", time, 1.0 + time),),
+        curves=(measurement.Curve("normal_load", time, 1.0 + time),),
         jumps=scene.jump_in.readings(0, 1),
     )
     free = [free_number(scene, "zero.displacement=2 um:3 um")]
@@ -483,9 +483,9 @@ def test_a_jump_is_refused_under_a_load_and_without_a_history_and_for_other_file
     for place, faulty in (((0, 1), True), ((1, 2), False), ((0, 3), True)):
         if faulty:
             with pytest.raises(BadInput, match=f"2 readings for {place[1]} files"):
-                likelihood.read(path, scene, place=place)
+                measurement.read(path, scene, place=place)
         else:
-            (jump,) = likelihood.read(path, scene, place=place).jumps
+            (jump,) = measurement.read(path, scene, place=place).jumps
             assert jump.value == 2.4e-6
     rest = {k: v for k, v in SCENE.items() if k != "instrument"}
     rest["jump_in"] = {**table, "displacement": ["2.5 um"]}
@@ -496,10 +496,10 @@ def test_a_jump_is_refused_under_a_load_and_without_a_history_and_for_other_file
         encoding="utf-8",
     )
     with pytest.raises(BadInput, match="jump_in: a contact under a load closes at"):
-        likelihood.read(plain, load(rest | {"contact": held}))
+        measurement.read(plain, load(rest | {"contact": held}))
     plain.write_text("t [s], normal_load [nN]\n0, 1\n1, 2\n", encoding="utf-8")
     with pytest.raises(BadInput, match="jump_in: needs the history of a loop"):
-        likelihood.read(plain, load(rest))
+        measurement.read(plain, load(rest))
 
 
 @pytest.mark.verify
