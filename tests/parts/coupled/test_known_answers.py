@@ -177,6 +177,21 @@ def test_the_largest_friction_of_a_slider_without_mass_and_damping_is_a_force_th
     assert float(course.peak_friction) <= borne
 
 
+@pytest.mark.parametrize("bonds", [{"model": "rate"}, {"model": "cohort"}])
+def test_friction_at_the_jump_of_a_load_is_too_large_by_the_growth_of_the_area_and_the_spring_force_is_not(
+    bonds,
+):
+    """The limit that docs/limits.md states: spring force and friction balance but in the record of the jump."""
+    load = {"time": [0.0, 1.0, 1.0, 2.0], "value": [2e-4, 2e-4, 4e-4, 4e-4]}
+    drive = {"model": "spring", "stage": 1e-5, "stiffness": 50.0}
+    course = run(2.0, 0.25, drive=drive, bonds=BONDS | bonds, contact={"load": load})
+    area, force = course.contact_area.values, course.spring_force.values
+    growth = np.ones(9)
+    growth[4] = area[4] / area[3]
+    assert growth[4] > 1.2
+    assert_allclose(course.friction_force, growth * force, rtol=1e-5)
+
+
 @pytest.mark.parametrize(
     "bonds", [{"model": "rate"}, {"model": "cohort"}, {"model": "tracked", "sites": 50}]
 )
