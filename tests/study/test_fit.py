@@ -377,7 +377,7 @@ PART = 25
     [
         ("common", 0, 20),
         *(
-            pytest.param(kind, part, 200, marks=pytest.mark.verify)
+            pytest.param(kind, part, 50, marks=pytest.mark.verify)
             for kind, count in SETS.items()
             for part in range(count // PART)
         ),
