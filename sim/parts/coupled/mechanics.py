@@ -697,21 +697,25 @@ def misses(before, after, last, energy, row, slider, step):
     A stored energy below the tolerance is as good as none: all sites at the unit of stretch store 1/2. If much is
     missing already, the tolerance is of what is dissipated, and of what is stored by the share of the time so far.
     """
-    tolerance, size = slider.tolerance, max(before, after)
-    missing = retained(energy) - retained(last) - (after - before)
-    if step > BRIEF * slider.length and math.fabs(missing) > tolerance * max(
-        size, math.fabs(energy.work), tolerance
+    tolerance, size, retains = slider.tolerance, max(before, after), retained(energy)
+    missing = retains - retained(last) - (after - before)
+    # of the sums since the start of the clock step, of which next to nothing may be stored by now
+    rounding = _ROUNDED * (math.fabs(energy.work) + math.fabs(retains))
+    if (
+        step > BRIEF * slider.length
+        and math.fabs(missing)
+        > tolerance * max(size, math.fabs(energy.work), tolerance) + rounding
     ):
         return True
     size, total = (
         max(size, math.fabs(row.worked + energy.work)),
-        row.missed + retained(energy) - after + energy.stored,
+        row.missed + retains - after + energy.stored,
     )
     rounding = _ROUNDED * (size + slider.stiffness * row.position * row.position)
     excess = math.fabs(total) - _MISSED * tolerance * size - rounding
     if step <= 1e2 * LEAST * slider.length or total * missing <= 0.0 or excess <= 0.0:
         return False
-    turned = math.fabs(energy.work - last.work - retained(energy) + retained(last))
+    turned = math.fabs(energy.work - last.work - retains + retained(last))
     turned += 4.0 * step / (row.elapsed + slider.length) * size
     room = max(0.0, _MISSED * tolerance * size - excess) * _FEW
     return math.fabs(missing) > tolerance * turned + room + rounding
