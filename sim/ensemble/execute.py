@@ -10,6 +10,7 @@ import concurrent.futures
 import contextlib
 import functools
 import importlib
+import io
 import os
 import pickle
 import signal
@@ -55,6 +56,24 @@ class WorkerDied(RuntimeError):
     exit_code = 1
 
 
+def pickled(value: object) -> bytes:
+    """Return a value for another process, with the local classes that tables of a scenario have."""
+    import cloudpickle
+    from pydantic.dataclasses import is_pydantic_dataclass, rebuild_dataclass
+
+    class Pickler(cloudpickle.Pickler):  # type: ignore[misc]
+        def reducer_override(self, value: Any) -> Any:
+            # it goes by its parts, and pydantic up to 2.14.0 never ends to build a schema that comes deferred
+            is_local = "<locals>" in getattr(value, "__qualname__", "")
+            if is_local and is_pydantic_dataclass(value):
+                rebuild_dataclass(value)
+            return super().reducer_override(value)
+
+    target = io.BytesIO()
+    Pickler(target).dump(value)
+    return target.getvalue()
+
+
 @dataclass
 class _Chain:
     """The blocks of a task that are missing, the next one last; ``broken`` counts the pools that broke under it.
@@ -71,9 +90,7 @@ class _Chain:
 
     @functools.cached_property
     def pickled(self) -> bytes:
-        import cloudpickle  # as tables of a scenario have local classes
-
-        return bytes(cloudpickle.dumps(self.task))
+        return pickled(self.task)
 
 
 @dataclass

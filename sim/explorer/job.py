@@ -12,7 +12,7 @@ import cloudpickle
 import numpy as np
 import xarray as xr
 
-from sim.ensemble.execute import end_with
+from sim.ensemble.execute import end_with, pickled
 from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
 from sim.explorer.drawing import listed
@@ -190,10 +190,10 @@ def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:
     A task takes a function for its messages, and returns its result. The process writes each message as a line of JSON;
     the last has ``result`` or ``fault``. It does not outlive the present process.
     """
-    pickled = cloudpickle.dumps(task)
+    read = pickled(task)
     return [sys.executable, "-c", _BEGIN, str(os.getpid())], b"%d\n%s" % (
-        len(pickled),
-        pickled,
+        len(read),
+        read,
     )
 
 

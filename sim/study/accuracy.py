@@ -17,7 +17,9 @@ _BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 def part_table(part: object) -> dict[str, Any]:
     """Return the keys of a part that have a value, as its table in a scenario file."""
-    return dict(TypeAdapter(Any).dump_python(part, by_alias=True, exclude_none=True))
+    # its own type, because pydantic before 2.14 does not build the deferred schema of a part of any type
+    adapter = TypeAdapter(type(part))
+    return dict(adapter.dump_python(part, by_alias=True, exclude_none=True))
 
 
 def alternatives(scenario: Scenario) -> Iterator[tuple[str, dict[str, Any]]]:

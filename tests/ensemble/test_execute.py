@@ -5,6 +5,7 @@ import concurrent.futures
 import contextlib
 import functools
 import itertools
+import pickle
 import subprocess
 import sys
 import threading
@@ -20,12 +21,13 @@ from helpers.scenes import CONTACTS, LOADS
 import sim
 from sim.cli import cli
 from sim.ensemble import execute, plan as plans, simulate as ensemble
-from sim.ensemble.execute import WorkerDied, compute
+from sim.ensemble.execute import WorkerDied, compute, pickled
 from sim.ensemble.plan import Plan
 from sim.ensemble.store import BlockFiles, MemoryBlocks, Stopped
 from sim.numerics import jit
 from sim.step.stepper import Stepper
 from sim.units.errors import BadInput
+from sim.units.quantity import keyed
 from tests.ensemble.test_store import same
 
 sample = functools.partial(scenes.sample, sweep=LOADS)
@@ -49,6 +51,16 @@ def workers(parent=None):
         except psutil.Error:  # one that ends now
             continue
     return found
+
+
+def test_the_schema_of_a_local_class_is_built_before_it_goes_to_another_process():
+    @keyed()
+    class Local:
+        value: float = 0.0
+
+    assert not Local.__pydantic_complete__
+    assert pickle.loads(pickled(Local))(value=2.0).value == 2.0
+    assert Local.__pydantic_complete__
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,7 @@ def damaged(dataset, name, kind):
             values.attrs,
         )
     elif kind == "text":
-        texts = np.full(values.shape, "some text", object)
+        texts = np.full(values.shape, "some text")
         changed = xr.Variable(values.dims, texts, {})
     else:
         is_text = values.dtype.kind in "OU"
