@@ -63,7 +63,8 @@ def pickled(value: object) -> bytes:
 
     class Pickler(cloudpickle.Pickler):  # type: ignore[misc]
         def reducer_override(self, value: Any) -> Any:
-            # it goes by its parts, and pydantic up to 2.14.0 never ends to build a schema that comes deferred
+            # cloudpickle sends what a local class consists of. A schema that pydantic has yet to build is built before
+            # that: with pydantic up to 2.14.0 the other process ends in a RecursionError.
             is_local = "<locals>" in getattr(value, "__qualname__", "")
             if is_local and is_pydantic_dataclass(value):
                 rebuild_dataclass(value)

@@ -190,10 +190,10 @@ def command(task: Callable[[Say], dict[str, Any]]) -> tuple[list[str], bytes]:
     A task takes a function for its messages, and returns its result. The process writes each message as a line of JSON;
     the last has ``result`` or ``fault``. It does not outlive the present process.
     """
-    read = pickled(task)
+    task_bytes = pickled(task)
     return [sys.executable, "-c", _BEGIN, str(os.getpid())], b"%d\n%s" % (
-        len(read),
-        read,
+        len(task_bytes),
+        task_bytes,
     )
 
 

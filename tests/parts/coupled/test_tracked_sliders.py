@@ -233,8 +233,8 @@ def test_below_the_onset_period_size_and_peak_of_slips_approach_those_of_the_coh
 
 def test_a_slider_comes_to_rest_within_a_clock_step_in_few_sub_steps():
     """Damping takes all but 1e-11 of the energy of an unloaded interface: later losses are roundings of the sum."""
-    names = "spring with unloaded holds", "modal, wave, relaxing stress"
-    drive, shear = DRIVES[names[0]], SHEARS[names[1]]
+    drive = DRIVES["spring with unloaded holds"]
+    shear = SHEARS["modal, wave, relaxing stress"]
     scenario = scene(1, 3, drive=drive, shear=shear, bonds=BONDS["tracked, constant"])
     *_, before, end = march(scenario, np.arange(1))
     assert end.drive.position < 1e-5 * before.drive.position
